@@ -94,7 +94,7 @@ install: all library
 	install -m 644 reference/cycles/*.py $(share)/cycles
 	install -m 644 reference/import_check/*.py $(share)/import_check
 	install -m 644 tools/docs/formats/*.schema.json $(share)
-	cp -R reference/scenes reference/engines golden tools/rubrics $(share)
+	cp -R reference/scenes reference/engines reference/starter golden tools/rubrics $(share)
 
 # Debian packages into BUILD/deb.
 deb: all library $(BUILD)/deps-deb

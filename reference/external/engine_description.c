@@ -12,13 +12,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const char *const format_names[] = {ENGINES(ENGINE_WORD) "dae", NULL};
+static const char *const format_names[] = {ENGINES(ENGINE_WORD) "dae", "file", NULL};
 static const char *const output_names[] = {"mean", "exact", "moments", NULL};
 static const char *const image_names[] = {"exr", "hdr", "pfm", NULL};
 
 /* What a placeholder may be called in each of the arrays. */
-static const char *const in_command[] = {"scene", "out",    "spp",     "seed", "depth",
-                                         "width", "height", "threads", "here", NULL};
+static const char *const in_command[] = {"scene",  "out",     "spp",  "seed", "depth", "width",
+                                         "height", "threads", "here", "name", NULL};
 static const char *const in_version[] = {"here", NULL};
 static const char *const in_lens[] = {"lens_radius", "focal_distance", NULL};
 static const char *const in_environment[] = {"environment", NULL};
@@ -123,6 +123,12 @@ static bool read_features(const struct json_node *n, struct engine *en, struct e
 {
     json_t *array, *value;
     size_t index;
+    if (en->takes_files && json_object_get(n->object, "expresses") == NULL)
+        return true;
+    if (en->takes_files)
+        return err_set(
+            e, "%s: 'expresses' is for scenes that are looked into, not for \"format\": \"file\"",
+            n->file);
     if (!json_get(n, "expresses", &array, e))
         return false;
     if (!json_is_array(array))
@@ -146,8 +152,8 @@ static bool read_extra(const struct json_node *n, const struct engine *en, const
 {
     unsigned used;
     bool has = json_object_get(n->object, key) != NULL;
-    bool wants = en->format == NULL && (en->feature & 1u << feature);
-    if (has && en->format != NULL)
+    bool wants = en->format == NULL && !en->takes_files && (en->feature & 1u << feature);
+    if (has && (en->format != NULL || en->takes_files))
         return err_set(e, "%s: '%s' is for \"format\": \"dae\" only", n->file, key);
     if (has != wants)
         return err_set(e, "%s: '%s' and the feature '%s' come together with \"format\": \"dae\"",
@@ -172,8 +178,10 @@ static bool read_name(const struct json_node *n, struct engine *en, struct err *
                                         ENGINES_WITH_GOLDENS(ENGINE_WORD) NULL};
     if (!json_get_text(n, "name", en->name, sizeof en->name, e))
         return false;
-    if (en->name[strspn(en->name, "abcdefghijklmnopqrstuvwxyz0123456789_-")] != '\0')
-        return err_set(e, "%s: 'name' is '%s'; a-z, 0-9, _ and - may be in it", n->file, en->name);
+    if (en->name[strspn(en->name, "abcdefghijklmnopqrstuvwxyz0123456789_-.")] != '\0' ||
+        en->name[0] == '.')
+        return err_set(e, "%s: 'name' is '%s'; a-z, 0-9, _, - and . may be in it", n->file,
+                       en->name);
     if (find(taken, en->name, strlen(en->name)) >= 0)
         return err_set(e, "%s: 'name' is '%s', which this program uses itself", n->file, en->name);
     return true;
@@ -194,6 +202,7 @@ static bool read_engine(const char *path, struct engine *en, struct err *e)
         !get_word(&n, "format", format_names, &word, e))
         return false;
     en->format = engine_kind_of(format_names[word]);
+    en->takes_files = strcmp(format_names[word], "file") == 0;
     if (!get_word(&n, "output", output_names, &word, e))
         return false;
     en->output = (enum engine_output)word;

@@ -12,7 +12,8 @@ struct engine {
     char file[4096]; /* the description */
     char here[4096]; /* its directory, absolute */
     char name[32];
-    const struct engine_kind *format; /* whose scene files it reads; NULL: the suite's own, "dae" */
+    const struct engine_kind *format; /* whose scene files it reads; NULL: the suite's own, "dae" or "file" */
+    bool takes_files;                 /* "file": the scene as it is, whatever it is; nobody looks into it */
     enum engine_output output;
     char image[8];    /* "exr" */
     unsigned feature; /* bits, features.h */
@@ -26,6 +27,8 @@ struct engine_options {
     int threads;
     double timeout_s;     /* of one process; it is killed (whole process group) after that */
     const char *work_dir; /* exists; gets a sub-directory, removed on success */
+    /* Replicates that are not independent are an error, and the manifest says how independent they are (independence.h). */
+    bool check_independence;
 };
 
 /* Fails, naming file and key, on anything that is not as above: unknown keys and placeholders, values

@@ -16,6 +16,7 @@ struct engine_job {
     int spp, replicates;
     bool half; /* some image had fewer than 32 bits */
     double cpu_s;
+    json_t *independence; /* with opt->check_independence: what the manifest gets; else NULL */
 };
 
 /* Checks that the engine can, and writes the scene to `path`; for a .dae only fills path. */

@@ -29,9 +29,9 @@ static bool find_program(const struct engine *en, const char *argv0, char *path,
 bool engine_program(const struct engine *en, const char *key, char *path, size_t size,
                     struct err *e)
 {
-    const char *const values[] = {"here",   en->here, "scene",   "",      "out", "",      "spp",
-                                  "",       "seed",   "",        "depth", "",    "width", "",
-                                  "height", "",       "threads", "",      NULL};
+    const char *const values[] = {"here",   en->here, "scene",   "",      "out",  "",      "spp",
+                                  "",       "seed",   "",        "depth", "",     "width", "",
+                                  "height", "",       "threads", "",      "name", "",      NULL};
     char **argv;
     if (!engine_argv(en, key, values, &argv, e))
         return false;
@@ -137,6 +137,8 @@ bool engine_describe(const struct engine_job *j, const struct moments *m, double
                         j->en->json, "half_floats", j->half, "seeds", seeds_of(j));
     json_decref(files);
     free(command);
+    if (*manifest != NULL && j->independence != NULL)
+        json_object_update(*manifest, j->independence);
     if (ok && *manifest == NULL)
         ok = err_set(e, "out of memory");
     return ok;

@@ -3,6 +3,7 @@
 #include "engine_internal.h"
 
 #include "reference/replicates/engine_driver.h"
+#include "reference/replicates/independence.h"
 #include "reference/replicates/replicate_images.h"
 #include "reference/base/process.h"
 
@@ -37,14 +38,32 @@ static bool command_line(const struct engine_job *j, uint32_t seed, const char *
     char environment[4096] = "";
     if (j->suite->environment[0] != '\0' && realpath(j->suite->environment, environment) == NULL)
         return err_set(e, "%s: %s", j->suite->environment, strerror(errno));
-    const char *const values[] = {"spp",         number[0],     "seed",
-                                  number[1],     "depth",       number[2],
-                                  "width",       number[3],     "height",
-                                  number[4],     "threads",     number[5],
-                                  "scene",       j->scene,      "out",
-                                  out,           "here",        j->en->here,
-                                  "lens_radius", number[6],     "focal_distance",
-                                  number[7],     "environment", environment,
+    const char *const values[] = {"spp",
+                                  number[0],
+                                  "seed",
+                                  number[1],
+                                  "depth",
+                                  number[2],
+                                  "name",
+                                  j->suite->name,
+                                  "width",
+                                  number[3],
+                                  "height",
+                                  number[4],
+                                  "threads",
+                                  number[5],
+                                  "scene",
+                                  j->scene,
+                                  "out",
+                                  out,
+                                  "here",
+                                  j->en->here,
+                                  "lens_radius",
+                                  number[6],
+                                  "focal_distance",
+                                  number[7],
+                                  "environment",
+                                  environment,
                                   NULL};
     const char *const key[3] = {"command", j->suite->lens_radius > 0 ? "lens_args" : "",
                                 environment[0] != '\0' ? "environment_args" : ""};
@@ -133,7 +152,10 @@ static bool fold_runs(struct engine_job *j, struct moments *m, struct err *e)
 {
     size_t pixels = (size_t)m->width * (size_t)m->height;
     struct replicate_repeats repeats;
-    bool ok = replicate_repeats_alloc(&repeats, j->replicates, e);
+    struct replicates seen = {0};
+    bool check = j->independence != NULL;
+    bool ok = replicate_repeats_alloc(&repeats, j->replicates, e) &&
+              (!check || replicates_alloc(&seen, m->width, m->height, j->replicates, e));
     for (int k = 0; ok && k < j->replicates; k++) {
         const struct path path = fs_path("%s/replicate_%04d.%s", j->dir, k, j->en->image);
         float *px = run_process(j, replicate_seed(j->opt->seed, k), path.s, e)
@@ -148,11 +170,16 @@ static bool fold_runs(struct engine_job *j, struct moments *m, struct err *e)
                          "replicate %d is the same image as an earlier one: the seed has no effect",
                          repeats.same);
         moments_add_image(m, px);
+        if (check)
+            replicates_add(&seen, px);
         free(px);
         unlink(path.s);
     }
     if (ok && (j->en->output == OUTPUT_EXACT || repeats.without_noise))
         make_exact(m);
+    else if (ok && check)
+        ok = independence_check(&seen, j->independence, e);
+    replicates_free(&seen);
     replicate_repeats_free(&repeats);
     return ok;
 }
@@ -201,10 +228,12 @@ bool engine_render(const struct engine *en, const struct suite_scene *scene,
     if (mkdtemp(dir.s) == NULL)
         return err_set(e, "%s: cannot make a directory in it: %s", work, strerror(errno));
     *manifest = NULL;
+    j.independence = opt->check_independence ? json_object() : NULL;
     bool rendered = engine_program(en, "command", j.program, sizeof j.program, e) &&
                     engine_write_scene(en, scene, dir.s, j.scene, e) && run_all(&j, out, e);
     bool ok = rendered && engine_describe(&j, out, now_seconds() - start, manifest, e) &&
               fs_remove_tree(dir.s, e);
+    json_decref(j.independence);
     if (ok)
         return true;
     if (rendered)

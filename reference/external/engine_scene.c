@@ -27,6 +27,9 @@ bool engine_write_scene(const struct engine *en, const struct suite_scene *suite
 {
     struct scene s = {0};
     struct camera c;
+    if (en->takes_files)
+        return realpath(suite->dae, path) != NULL ||
+               err_set(e, "%s: %s", suite->dae, strerror(errno));
     if (!suite_open(suite, &s, &c, e))
         return false;
     /* Mitsuba's count of bounces is ours plus one whoever reads the file, and so on: that is the

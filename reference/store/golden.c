@@ -195,9 +195,13 @@ static bool check_entry(const json_t *entry, const struct suite_scene *scene,
         !check_string(entry, "engine", ref->engine, where, "golden of another engine", e) ||
         !check_number(entry, "width", scene->width, where, e) ||
         !check_number(entry, "height", scene->height, where, e) ||
-        !check_number(entry, "depth", scene->depth, where, e) ||
-        !check_number(entry, "replicates", ref->replicates, where, e) ||
-        !check_number(entry, "spp", ref->spp, where, e) ||
+        !check_number(entry, "depth", scene->depth, where, e))
+        return false;
+    /* 0 of an engine that this program does not know: what its description said then. */
+    const bool free = engine_with_goldens(ref->engine) == NULL && strcmp(ref->engine, "truth") != 0;
+    if ((!(free && ref->replicates == 0) &&
+         !check_number(entry, "replicates", ref->replicates, where, e)) ||
+        (!(free && ref->spp == 0) && !check_number(entry, "spp", ref->spp, where, e)) ||
         !check_number(entry, "subgrid", ref->subgrid, where, e))
         return false;
     if (strcmp(ref->engine, "truth") != 0)
@@ -219,6 +223,8 @@ static bool check_moments(const struct moments *m, const json_t *entry, const ch
                        m->height, (long long)width, (long long)height);
     if (!check_string(entry, "unit", m->unit, exr, "its unit is not that of its manifest", e))
         return false;
+    if (strcmp(m->unit, "sample") == 0) /* as many as the engine saw fit, for each pixel */
+        return true;
     double n =
         strcmp(m->unit, "exact") == 0 ? 1 : json_number_value(json_object_get(entry, "replicates"));
     for (size_t p = 0; p < (size_t)m->width * (size_t)m->height; p++)
@@ -249,7 +255,7 @@ void golden_inspect(const char *golden_dir, const struct suite_scene *scene,
                     const struct suite_reference *ref, struct golden *out)
 {
     const struct place at = find_place(golden_dir, scene->name, ref->engine);
-    char where[PATH_MAX + 32];
+    char where[PATH_MAX + 64];
     *out = (struct golden){.state = GOLDEN_DAMAGED};
     struct err *e = &out->why;
     json_t *all = load_manifest(at.manifest.s, e);
@@ -260,7 +266,9 @@ void golden_inspect(const char *golden_dir, const struct suite_scene *scene,
     struct err stale = {0};
     if (!json_is_object(entry)) {
         out->state = GOLDEN_MISSING;
-        err_set(e, "%s: no golden of %s: make it with `make golden`", at.exr.s, ref->engine);
+        err_set(e, "%s: no golden of %s: `%s` makes it", at.exr.s, ref->engine,
+                engine_with_goldens(ref->engine) != NULL ? "make golden"
+                                                         : "assay golden render --engine FILE");
     } else {
         bool fits = check_entry(entry, scene, ref, where, &stale);
         if (read_pair(image_of(entry, at.exr.s, at.next.s), entry, &out->m, e)) {

@@ -49,6 +49,11 @@ static bool render_whole(const struct reference_job *job, void *ctx, struct err 
                                               w->manifest, e);
 }
 
+bool reference_is_rendered(const struct suite_reference *ref)
+{
+    return strcmp(ref->engine, "truth") != 0 && strcmp(ref->engine, "pathtracer") != 0;
+}
+
 static bool engine_render(const struct suite_scene *scene, const struct suite_reference *ref,
                           const struct reference_options *opt, struct moments *out,
                           json_t *manifest, struct err *e)

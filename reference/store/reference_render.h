@@ -20,6 +20,9 @@ bool reference_render(const struct suite_scene *scene, const struct suite_refere
 /* The same in parts, which may be made anywhere and in any order: ranges of the images that an engine's reference is folded
  * from (replicate_images.h). Not of "truth". */
 
+/* Is it made by rendering, and stored? Not closed forms, which are computed, nor our own program, which renders each time. */
+bool reference_is_rendered(const struct suite_reference *ref);
+
 /* How many images that are. */
 bool reference_count(const struct suite_scene *scene, const struct suite_reference *ref,
                      const struct reference_options *opt, int *num, struct err *e)

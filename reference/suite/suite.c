@@ -1,9 +1,11 @@
 #include "suite.h"
 
 #include "suite_json.h"
+#include "suite_own.h"
 
 #include "reference/base/json_file.h"
 #include "renderer/collada/collada.h"
+#include "renderer/base/fs.h"
 #include "renderer/base/sha256.h"
 
 #include <dirent.h>
@@ -17,8 +19,8 @@
 /* "NN_name": a family digit, a digit, an underscore, then a-z, 0-9 and underscores. */
 static bool is_scene_name(const char *s)
 {
-    if (strchr("1234569", s[0]) == NULL || s[0] == '\0' || s[1] < '0' || s[1] > '9' || s[2] != '_' ||
-        s[3] == '\0')
+    if (strchr("1234569", s[0]) == NULL || s[0] == '\0' || s[1] < '0' || s[1] > '9' ||
+        s[2] != '_' || s[3] == '\0')
         return false;
     return s[3 + strspn(s + 3, "abcdefghijklmnopqrstuvwxyz0123456789_")] == '\0';
 }
@@ -98,18 +100,36 @@ static bool list_scenes(const char *dir, struct stems *out, struct err *e)
     return true;
 }
 
-static bool hash_scene(struct suite_scene *s, struct err *e)
+/* Of the hashes of all files that a scene of one's own uses besides; "" if there are none. */
+static bool hash_uses(const char *dir, const struct suite_scene *s, char hex[65], struct err *e)
 {
-    char dae[65], environment[65] = "none", text[256];
+    const json_t *uses = json_object_get(s->json, "uses");
+    char text[2 * 65];
+    hex[0] = '\0';
+    for (size_t i = 0; i < json_array_size(uses); i++) {
+        const char *name = json_string_value(json_array_get(uses, i));
+        char one[65];
+        if (!sha256_file(name[0] == '/' ? name : fs_path("%s/%s", dir, name).s, one, e))
+            return false;
+        snprintf(text, sizeof text, "%s%s", hex, one);
+        sha256_text(text, hex);
+    }
+    return true;
+}
+
+static bool hash_scene(const char *dir, struct suite_scene *s, struct err *e)
+{
+    char dae[65], environment[65] = "none", uses[65], text[320];
     if (!sha256_file(s->dae, dae, e) ||
-        (s->environment[0] != '\0' && !sha256_file(s->environment, environment, e)))
+        (s->environment[0] != '\0' && !sha256_file(s->environment, environment, e)) ||
+        !hash_uses(dir, s, uses, e))
         return false;
-    if (s->environment[0] == '\0' && s->lens_radius == 0) {
+    if (s->environment[0] == '\0' && s->lens_radius == 0 && uses[0] == '\0') {
         memcpy(s->sha256, dae, sizeof dae);
         return true;
     }
-    snprintf(text, sizeof text, "%s environment %s lens %.17g %.17g", dae, environment,
-             s->lens_radius, s->focal_distance);
+    snprintf(text, sizeof text, "%s environment %s lens %.17g %.17g%s%s", dae, environment,
+             s->lens_radius, s->focal_distance, uses[0] != '\0' ? " uses " : "", uses);
     sha256_text(text, s->sha256);
     return true;
 }
@@ -128,35 +148,58 @@ static bool load_scene(const char *dir, const char *name, struct suite_scene *s,
         return err_set(e, "%s: %s", file, why.text);
     if (s->json == NULL)
         return err_set(e, "%s:%d: %s", file, why.line, why.text);
-    return suite_json_read(file, s, e) && hash_scene(s, e);
+    return suite_json_read(file, s, e) && hash_scene(dir, s, e);
+}
+
+static bool inherits(const struct suite *suite, const struct suite_scene *s)
+{
+    return suite->is_own ? strcmp(s->references_of, s->name) != 0 : s->name[0] == '9';
 }
 
 /* A 9x scene is held against another scene's references, at the same size. */
 static bool inherit(const struct suite *suite, const char *dir, struct suite_scene *s,
                     struct err *e)
 {
-    if (s->name[0] != '9')
+    if (!inherits(suite, s))
         return true;
+    const struct path file = suite->is_own ? fs_path("%s/suite.json: scenes.%s", dir, s->name)
+                                           : fs_path("%s/%s.json", dir, s->name);
     const struct suite_scene *base = suite_find(suite, s->references_of);
     if (base == NULL)
-        return err_set(e, "%s/%s.json: 'references_of' names no scene: '%s'", dir, s->name,
+        return err_set(e, "%s: 'references_of' names no scene: '%s'", file.s, s->references_of);
+    if (inherits(suite, base))
+        return err_set(e, "%s: 'references_of' names '%s', which has none of its own", file.s,
                        s->references_of);
-    if (base->name[0] == '9')
-        return err_set(e, "%s/%s.json: 'references_of' names '%s', which has none of its own", dir,
-                       s->name, s->references_of);
     if (base->width != s->width || base->height != s->height)
-        return err_set(e, "%s/%s.json: %d x %d pixels, but '%s' has %d x %d", dir, s->name,
-                       s->width, s->height, base->name, base->width, base->height);
+        return err_set(e, "%s: %d x %d pixels, but '%s' has %d x %d", file.s, s->width, s->height,
+                       base->name, base->width, base->height);
     memcpy(s->reference, base->reference, sizeof s->reference);
     s->num_references = base->num_references;
     s->not_expressible = base->not_expressible;
     return true;
 }
 
+static bool load_own(const char *dir, struct suite *out, struct err *e)
+{
+    struct suite suite = {0};
+    bool ok = suite_own_read(dir, &suite, e);
+    for (int i = 0; ok && i < suite.num_scenes; i++)
+        ok = hash_scene(dir, &suite.scene[i], e);
+    for (int i = 0; ok && i < suite.num_scenes; i++)
+        ok = inherit(&suite, dir, &suite.scene[i], e);
+    if (ok)
+        *out = suite;
+    else
+        suite_free(&suite);
+    return ok;
+}
+
 bool suite_load(const char *dir, struct suite *out, struct err *e)
 {
     struct suite suite = {0};
     struct stems stems = {0};
+    if (suite_own_is(dir))
+        return load_own(dir, out, e);
     if (!list_scenes(dir, &stems, e))
         goto fail;
     suite.scene = calloc(stems.num, sizeof *suite.scene);
@@ -184,6 +227,10 @@ bool suite_open(const struct suite_scene *s, struct scene *scene, struct camera 
                 struct err *e)
 {
     *scene = (struct scene){0};
+    if (s->is_opaque)
+        return err_set(
+            e, "%s: not COLLADA: only an engine with \"format\": \"file\" reads such a scene",
+            s->dae);
     if (!collada_load(s->dae, DIALECT_AUTO, scene, e))
         return false;
     bool ok = (s->environment[0] == '\0' || scene_read_environment(scene, s->environment, e)) &&

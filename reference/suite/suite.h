@@ -1,5 +1,5 @@
 /* The suite: reference/scenes/NN_name.dae with NN_name.json beside it (what to render, against which references, inside
- * which margins, what must come out: tools/docs/formats/suite.md) and NN_name.md (what it can detect, what it is blind
+ * which margins, what must come out: tools/docs/formats/scene.md) and NN_name.md (what it can detect, what it is blind
  * to, and, for closed forms, the derivation). Families by number: 1x closed form, 2x BSDF, 3x light, 4x whole scene,
  * 5x and 6x pairs of features, 9x must differ. An unknown key, a missing key, a value out of range is an error with file and reason. */
 #ifndef ASSAY_SUITE_H
@@ -20,13 +20,14 @@ enum verdict {
 };
 
 struct suite_reference {
-    char engine[16];      /* of engine_table.h, with goldens, or "truth" */
+    char engine[32];      /* of engine_table.h, with goldens, or "truth"; in a suite of one's own also "pathtracer", or the
+                             name of what is stored, of any engine */
     char fidelity[16];    /* "class" in the file: "exact", "limit" (exact in the limit of its own
                              settings) or "approximate" */
     double margin_global; /* largest relative difference of the image mean that counts as equal */
     double margin_tile;   /* the same for one tile */
-    int replicates;       /* engines: images with a seed of their own */
-    int spp;              /* samples per pixel of one replicate, or */
+    int replicates;       /* engines: images with a seed of their own; 0: as many as its description says */
+    int spp;              /* samples per pixel of one replicate (0 likewise), or */
     int subgrid;          /* (engine_kind.subgrid) one is a box-averaged (k W) x (k H) image */
     char kind[32];        /* truth: which closed form (truth.h) */
     json_t *values;       /* truth: its numbers; borrowed from the suite */
@@ -40,15 +41,16 @@ struct suite_variant {
     const char *options[9];            /* NULL at the end; borrowed from the suite */
 };
 
-enum { MAX_VARIANTS = 8, MAX_REFERENCES = NUM_ENGINES_WITH_GOLDENS + 1 /* truth */ };
+enum { MAX_VARIANTS = 8, MAX_REFERENCES = 8 };
 
 struct suite_scene {
     char name[64];                      /* "41_cornell" */
-    char dae[4096];                     /* path of the .dae */
+    char dae[4096];                     /* path of the .dae, in a suite of one's own of any file */
+    bool is_opaque;                     /* not COLLADA: only an engine with the format "file" reads it */
     char environment[4096];             /* path of an .exr or .hdr; empty if there is none */
     double lens_radius, focal_distance; /* as of struct camera; 0 and 0: pinhole */
     char sha256[65]; /* lower-case hex: of the .dae; with an environment or a lens, of a text that
-                        holds that, the environment's and the lens */
+                        holds that, the environment's, the lens and the files that it uses */
     char title[128], detects[512], blind_to[512];
     char convention[512]; /* where correct renderers may differ; empty: nowhere */
     int width, height;
@@ -79,9 +81,11 @@ struct suite_scene {
 struct suite {
     struct suite_scene *scene; /* sorted by name */
     int num_scenes;
+    bool is_own;       /* of a suite.json: suite_own.h */
+    char engine[4096]; /* of that: path of the description of what is judged; empty: none is named */
 };
 
-/* Loads all scenes of a directory. A 9x scene inherits the `references` object of the scene it
+/* Loads all scenes of a directory: those of its suite.json, else all that stand in it. A 9x scene inherits the `references` object of the scene it
  * names. Fails on an empty directory, a .dae without .json and the reverse. */
 bool suite_load(const char *dir, struct suite *out, struct err *e)
     __attribute__((warn_unused_result));

@@ -118,7 +118,7 @@ else
 fi
 
 # JSON Schemas: those of the pages, and valid is what programs write.
-for page in results grades; do
+for page in results grades suite; do
     tell "the schema of $page is its page's" "$(python3 "$top/tools/packaging/schemas.py" $formats/$page.md | diff - $formats/$page.schema.json | head -n 3)"
 done
 cat >valid.py <<'END'

@@ -1,5 +1,7 @@
 #include "data_dirs.h"
 
+#include "reference/suite/suite_own.h"
+
 #include <unistd.h>
 
 struct data_dirs data_dirs_find(void)
@@ -19,4 +21,17 @@ struct data_dirs data_dirs_find(void)
                               .catalogue = fs_path("%s/diagnose", golden.s),
                               .share = share,
                               .pathtracer = fs_beside_program("pathtracer")};
+}
+
+struct data_dirs data_dirs_of_suite(const char *suite_dir)
+{
+    struct data_dirs at = data_dirs_find();
+    if (suite_dir == NULL && !suite_own_is("."))
+        return at;
+    at.suite = fs_path("%s", suite_dir != NULL ? suite_dir : ".");
+    if (suite_dir == NULL)
+        at.golden = fs_path("golden");
+    else if (suite_own_is(suite_dir))
+        at.golden = fs_path("%s/golden", suite_dir);
+    return at;
 }

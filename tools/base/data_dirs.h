@@ -11,5 +11,8 @@ struct data_dirs {
     struct path pathtracer;               /* the program beside this one */
 };
 struct data_dirs data_dirs_find(void);
+/* The same, with suite_dir and, if that is a suite of the user's own (suite_own.h), with its golden/. NULL: the one in which one
+ * stands, if it is such. */
+struct data_dirs data_dirs_of_suite(const char *suite_dir);
 
 #endif

@@ -18,6 +18,7 @@ static const struct {
     const char *help;
 } verbs[] = {
     {"validate", command_validate, "render the suite and judge it against its references"},
+    {"init", command_init, "write a suite of your own that works: scene, reference, CI file"},
     {"compare", command_compare, "judge two renders, of any kind of file"},
     {"diagnose", command_diagnose, "name the known bug that explains how a renderer is wrong"},
     {"converge", command_converge, "measure variance, convergence and efficiency of engines"},

@@ -1,5 +1,7 @@
 /* assay golden render | status | approve: from rendering a reference to storing it. */
+#include "reference/suite/suite_own.h"
 #include "renderer/base/cli.h"
+#include "tools/base/data_dirs.h"
 #include "tools/golden/approve.h"
 #include "tools/golden/noise_record.h"
 #include "tools/validate/noise_ladder.h"
@@ -25,8 +27,12 @@ static const struct cli_option options[] = {
      "those that are up to date and have no candidate",
      TO(all)},
     {0, "from", "DIR", "candidates (build/golden-candidate)", TO(opt.from_dir)},
-    {0, "golden", "DIR", "stored references (golden)", TO(opt.golden_dir)},
-    {0, "suite", "DIR", "the scenes (reference/scenes)", TO(suite_dir)},
+    {0, "golden", "DIR", "stored references (golden; of a suite.json golden beside it)",
+     TO(opt.golden_dir)},
+    {0, "suite", "DIR",
+     "the scenes (that of the folder, if it has a suite.json, else\n"
+     "reference/scenes)",
+     TO(suite_dir)},
     {0, "new", "", "approve also where nothing is stored", TO(opt.accept_new)},
     {0, "accept-difference", "WHY", "approve also what is DIFFERENT; WHY goes into the manifest",
      TO(opt.why)},
@@ -46,7 +52,7 @@ static const struct suite_reference *rendered_reference(const struct suite *suit
         *scene = &suite->scene[s];
         for (int k = 0; k < (*scene)->num_references; k++)
             if (strcmp((*scene)->references_of, (*scene)->name) == 0 &&
-                strcmp((*scene)->reference[k].engine, "truth") != 0 && i-- == 0)
+                reference_is_rendered(&(*scene)->reference[k]) && i-- == 0)
                 return &(*scene)->reference[k];
     }
     return NULL;
@@ -177,8 +183,9 @@ static int status(const struct settings *s, const struct suite *suite, struct er
 static void print_command(const struct settings *s, const struct suite_scene *scene,
                           const struct suite_reference *ref)
 {
-    printf("  assay golden approve --from %s --golden %s --accept-difference \"...\" %s/%s\n",
-           s->opt.from_dir, s->opt.golden_dir, scene->name, ref->engine);
+    printf(
+        "  assay golden approve --suite %s --from %s --golden %s --accept-difference \"...\" %s/%s\n",
+        s->suite_dir, s->opt.from_dir, s->opt.golden_dir, scene->name, ref->engine);
 }
 
 /* All that are selected, whatever becomes of the others; the line for exit code 3 is that of the first
@@ -223,8 +230,8 @@ static int approve_all(const struct settings *s, const struct suite *suite, stru
     printf(
         "%d approved, %d unchanged, %d refused as DIFFERENT, %d as INCONCLUSIVE, %d impossible\n",
         count[APPROVE_ACCEPTED], count[APPROVE_UNCHANGED], count[APPROVE_DIFFERENT],
-        count[APPROVE_INCONCLUSIVE], count[APPROVE_IMPOSSIBLE] + (int)orphans);
-    if (orphans > 0 && count[APPROVE_IMPOSSIBLE]++ == 0)
+        count[APPROVE_INCONCLUSIVE], count[APPROVE_IMPOSSIBLE] + (suite->is_own ? 0 : (int)orphans));
+    if (orphans > 0 && !suite->is_own && count[APPROVE_IMPOSSIBLE]++ == 0)
         err_set(e, "%s/%s: not in the suite", s->opt.from_dir, first);
     json_decref(names);
     return count[APPROVE_IMPOSSIBLE] > 0     ? EXIT_NOT_JUDGED
@@ -235,9 +242,7 @@ static int approve_all(const struct settings *s, const struct suite *suite, stru
 
 int command_golden(int argc, char **argv, struct err *e)
 {
-    struct settings s = {
-        .suite_dir = "reference/scenes",
-        .opt = {.from_dir = "build/golden-candidate", .golden_dir = "golden", .alpha = 1e-3}};
+    struct settings s = {.opt = {.from_dir = "build/golden-candidate", .alpha = 1e-3}};
     const char *what = argc > 1 ? argv[1] : "";
     if (strcmp(what, "render") == 0)
         return command_reference(argc - 1, argv + 1, e);
@@ -259,6 +264,11 @@ int command_golden(int argc, char **argv, struct err *e)
         err_set(e, "golden status takes no names");
         return EXIT_NOT_JUDGED;
     }
+    const struct data_dirs at = data_dirs_of_suite(s.suite_dir);
+    if (s.suite_dir == NULL)
+        s.suite_dir = suite_own_is(".") ? "." : "reference/scenes";
+    if (s.opt.golden_dir == NULL)
+        s.opt.golden_dir = suite_own_is(s.suite_dir) ? at.golden.s : "golden";
     if (!suite_load(s.suite_dir, &suite, e))
         return EXIT_NOT_JUDGED;
     int code = is_status ? status(&s, &suite, e) : approve_all(&s, &suite, e);

@@ -5,6 +5,7 @@
 
 #include "renderer/base/err.h"
 
+int command_init(int argc, char **argv, struct err *e);
 int command_validate(int argc, char **argv, struct err *e);
 int command_compare(int argc, char **argv, struct err *e);
 int command_converge(int argc, char **argv, struct err *e);

@@ -1,5 +1,6 @@
 #include "reference_options.h"
 
+#include "reference/suite/suite_own.h"
 #include "renderer/base/cli.h"
 #include "renderer/base/fs.h"
 
@@ -11,11 +12,16 @@
 static const struct cli_option options[] = {
     {0, "only", "SCENE", "only this scene; may be given again",
      CLI_TO_LIST(struct reference_command, only, num_only), .noun = "scenes"},
-    {0, "engine", "NAME",
+    {0, "engine", "NAME|FILE",
      "only one engine's, of" ENGINES_WITH_GOLDENS(
          ENGINE_TEXT) ";\n"
-                      "with --noise also pathtracer, pathtracer-sobol",
+                      "with --noise also pathtracer, pathtracer-sobol; FILE.json:\n"
+                      "any renderer's, for the reference --as NAME of a suite.json",
      TO(engine)},
+    {0, "as", "NAME",
+     "with --engine FILE.json: which reference it makes (the one that\n"
+     "is called as the engine, or as it and -VERSION)",
+     TO(as)},
     {0, "noise", "",
      "not the images, but how noisy each engine is, ours too: the\n"
      "variance of a sample, and its fall over 1, 4, 16, 64 samples",
@@ -28,7 +34,10 @@ static const struct cli_option options[] = {
      "Cycles its replicates, of POV-Ray 32 windows without noise, then\n"
      "its replicates; what a job of assay plan does",
      CLI_TO_RANGE(struct reference_command, first), 0, INT32_MAX, .noun = "image"},
-    {0, "suite", "DIR", "the scenes (reference/scenes)", TO(suite_dir)},
+    {0, "suite", "DIR",
+     "the scenes (that of the folder, if it has a suite.json, else\n"
+     "reference/scenes)",
+     TO(suite_dir)},
     {0, "share", "DIR", "where cycles.py is (reference)", TO(opt.share_dir)},
     {0, "work", "DIR", "temporary files (build/work)", TO(work)},
     {0, "seed", "N", "seed of all replicates (that of what is stored, else 1)", TO(seed), 0,
@@ -39,10 +48,39 @@ static const struct cli_option options[] = {
     {'h', "help", "", "print this", TO(help), .usage = "usage: assay reference [options]\n"},
     {0}};
 
+/* Of what one engine renders: its own name or that with a version. Which is a reference of the suite, and the only such? */
+static bool choose_name(struct reference_command *c, struct err *e)
+{
+    const char *name = c->described.name;
+    char list[512] = "";
+    size_t n = strlen(name);
+    bool exact = false, ambiguous = false;
+    const char *found = NULL;
+    for (int i = 0; i < c->suite.num_scenes; i++)
+        for (int k = 0; k < c->suite.scene[i].num_references; k++) {
+            const char *r = c->suite.scene[i].reference[k].engine;
+            if (c->as != NULL ? strcmp(r, c->as) == 0 : strcmp(r, name) == 0) {
+                exact = true;
+                found = r;
+            }
+            if (!exact && c->as == NULL && strncmp(r, name, n) == 0 && r[n] == '-') {
+                ambiguous |= found != NULL && strcmp(found, r) != 0;
+                found = r;
+            }
+            if (strstr(list, r) == NULL)
+                snprintf(list + strlen(list), sizeof list - strlen(list), " %s", r);
+        }
+    if (found == NULL || (ambiguous && !exact))
+        return err_set(e, "%s: is it one of%s, the references of %s/suite.json? give --as NAME",
+                       c->as != NULL ? c->as : name, list, c->suite_dir);
+    c->as = found;
+    return true;
+}
+
 bool reference_options_read(int argc, char **argv, struct reference_command *c, struct err *e)
 {
     *c = (struct reference_command){.out = "build/golden-candidate",
-                                    .suite_dir = "reference/scenes",
+                                    .suite_dir = suite_own_is(".") ? "." : "reference/scenes",
                                     .work = "build/work",
                                     .seed = -1,
                                     .opt = {.timeout_s = 7200, .share_dir = "reference"}};
@@ -51,7 +89,14 @@ bool reference_options_read(int argc, char **argv, struct reference_command *c, 
     if (c->help)
         return true;
     bool ours = c->noise && c->engine != NULL && strncmp(c->engine, "pathtracer", 10) == 0;
-    if (c->engine != NULL && engine_with_goldens(c->engine) == NULL && !ours)
+    const bool file = c->engine != NULL && strpbrk(c->engine, "./") != NULL;
+    if (c->as != NULL && !file)
+        return err_set(e, "--as is for --engine FILE.json");
+    if (file && (c->noise || c->last > 0 || c->slurm))
+        return err_set(e, "--engine FILE.json goes with none of --noise, --pictures, --slurm");
+    if (file && !engine_load(c->engine, &c->described, e))
+        return false;
+    if (c->engine != NULL && engine_with_goldens(c->engine) == NULL && !ours && !file)
         return err_set(e, "--engine: '%s' is none of" ENGINES_WITH_GOLDENS(ENGINE_TEXT), c->engine);
     if (c->noise && (c->last > 0 || c->slurm))
         return err_set(e, "--noise goes with neither --pictures nor --slurm");
@@ -66,11 +111,17 @@ bool reference_options_read(int argc, char **argv, struct reference_command *c, 
     for (int i = 0; i < c->num_only; i++)
         if (suite_find(&c->suite, c->only[i]) == NULL)
             return err_set(e, "no scene '%s' in %s", c->only[i], c->suite_dir);
-    return true;
+    if (!file)
+        return true;
+    if (!c->suite.is_own)
+        return err_set(e, "--engine FILE.json renders references of a suite.json, which %s has not",
+                       c->suite_dir);
+    return choose_name(c, e);
 }
 
 void reference_options_free(struct reference_command *c)
 {
+    engine_free(&c->described);
     suite_free(&c->suite);
 }
 
@@ -94,15 +145,20 @@ bool reference_options_each(const struct reference_command *c,
         const struct suite_scene *scene = &c->suite.scene[i];
         for (int k = 0; reference_options_selects(c, scene) && k < scene->num_references; k++) {
             const struct suite_reference *ref = &scene->reference[k];
-            if (strcmp(ref->engine, "truth") == 0 ||
-                (c->engine != NULL && strcmp(c->engine, ref->engine) != 0))
+            if (!reference_is_rendered(ref) ||
+                (c->as != NULL       ? strcmp(c->as, ref->engine) != 0
+                 : c->engine != NULL ? strcmp(c->engine, ref->engine) != 0
+                                     : engine_with_goldens(ref->engine) == NULL))
                 continue;
             if (!one(ctx, scene, ref, e))
                 return false;
             num++;
         }
     }
-    return num > 0 || err_set(e, "no scene of %s has such a reference", c->suite_dir);
+    return num > 0 || err_set(e, "no scene of %s has such a reference%s", c->suite_dir,
+                              c->suite.is_own && c->as == NULL
+                                  ? " (of an engine of your own: --engine FILE.json)"
+                                  : "");
 }
 
 static bool is_up_to_date(const char *dir, const struct suite_scene *scene,

@@ -3,12 +3,15 @@
 #ifndef ASSAY_REFERENCE_OPTIONS_H
 #define ASSAY_REFERENCE_OPTIONS_H
 
+#include "reference/external/engine_description.h"
 #include "reference/store/reference_render.h"
 
 enum { REFERENCE_MOST_SCENES = 64 };
 
 struct reference_command {
     const char *only[REFERENCE_MOST_SCENES], *engine, *out, *golden, *suite_dir, *work;
+    const char *as; /* with --engine FILE: the reference that it makes */
+    struct engine described; /* of --engine FILE; its name is empty where there is none */
     int num_only;
     struct reference_options opt;
     int seed;        /* negative: none was given */

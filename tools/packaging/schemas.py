@@ -13,7 +13,7 @@ VERDICTS = ["EQUIVALENT", "DIFFERENT", "NO DIFFERENCE FOUND", "INCONCLUSIVE"]
 NUMBER, TEXT = {"type": "number"}, {"type": "string"}
 PAIR = {"type": "array", "items": {"type": ["number", "null"]}, "minItems": 2, "maxItems": 2}
 TYPES = {
-    "text": TEXT, "number": NUMBER, "boolean": {"type": "boolean"}, "array": {"type": "array"}, "object": {"type": "object"},
+    "text": TEXT, "file": TEXT, "number": NUMBER, "boolean": {"type": "boolean"}, "array": {"type": "array"}, "object": {"type": "object"},
     "verdict": {"enum": VERDICTS}, "verdict or MEASURED": {"enum": VERDICTS + ["MEASURED"]}, ", ".join(VERDICTS): {"enum": VERDICTS},
     "relative": NUMBER, "relative RMS": NUMBER, "radiance": NUMBER, "relative, squared": NUMBER, "ratio": NUMBER, "probability": {"type": "number", "minimum": 0, "maximum": 1},
     "0 to 1": {"type": "number", "minimum": 0, "maximum": 1},
@@ -27,7 +27,7 @@ TYPES = {
     "pixels [x, y]": {"type": "array", "items": {"type": "integer"}, "minItems": 2, "maxItems": 2},
     "SHA-256": {"type": "string", "pattern": "^[0-9a-f]{64}$"},
 }
-WITHOUT_UNIT = {"text", "number", "boolean", "array", "object", "verdict", "1", "1 or 2"}
+WITHOUT_UNIT = {"text", "file", "array of texts", "number", "boolean", "array", "object", "verdict", "1", "1 or 2"}
 INTERVAL = re.compile(r"(^|_)(ci|range)$")
 
 
@@ -43,11 +43,15 @@ def schema_of(key, kind, meaning):
         kind_schema = PAIR
     elif kind in TYPES:
         kind_schema = TYPES[kind]
+    elif found := re.fullmatch(r"whole number (\d+) to (\d+)", kind):
+        kind_schema = {"type": "integer", "minimum": int(found[1]), "maximum": int(found[2])}
+    elif found := re.fullmatch(r"number above (\d+) below (\d+)", kind):
+        kind_schema = {"type": "number", "exclusiveMinimum": int(found[1]), "exclusiveMaximum": int(found[2])}
     else:
         sys.exit(f"schemas.py: type '{kind}' of '{key}' is not known")
     if may_be_null:
         kind_schema = {"anyOf": [kind_schema, {"type": "null"}]}
-    unit = "" if kind in WITHOUT_UNIT or kind.startswith(("`", "object", "array")) else f"[{kind}] "
+    unit = "" if kind in WITHOUT_UNIT or kind.startswith(("`", "object", "array", "whole number", "number above")) else f"[{kind}] "
     text = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", meaning).replace("`", "")
     return dict(kind_schema, description=(unit + text).strip()) if unit + text else dict(kind_schema)
 
@@ -79,7 +83,7 @@ def properties(header, rows):
             kinds = parts
         for key, kind in zip(keys, kinds):
             out[key] = schema_of(key, kind, cell["meaning"])
-            if cell.get("needed", "").startswith("yes"):
+            if cell.get("needed", "").startswith("yes") or cell.get("default") == "needed":
                 needed.append(key)
     return out, needed
 
@@ -128,18 +132,36 @@ def grades(page):
     return root, [k for k in root if k in ("assay_grade", "id", "state", "points", "of", "parts", "checks", "pictures")]
 
 
+def suite(page):
+    parts = {}
+    for heading, header, rows in tables(page):
+        if "type" in header:
+            parts[heading.split(",")[0]] = properties(header, rows)
+    (root, needed), (scene, scene_needed), (reference, _) = (parts[k] for k in ("The suite", "A scene", "A reference"))
+    root["references"], scene["references"] = {"type": "object"}, {"type": "object"}
+    name, closed = {"pattern": "^[A-Za-z0-9_-][A-Za-z0-9_.-]*$", "maxLength": 63}, {"type": "object", "additionalProperties": False}
+    reference = dict(closed, properties=reference)
+    root["references"] |= {"propertyNames": dict(name, maxLength=31), "additionalProperties": {"$ref": "#/$defs/reference"}}
+    scene["references"] |= {"propertyNames": dict(name, maxLength=31),
+                            "additionalProperties": {"anyOf": [{"$ref": "#/$defs/reference"}, {"type": "null"}]}}
+    root["scenes"] |= {"propertyNames": name, "minProperties": 1, "additionalProperties": {"$ref": "#/$defs/scene"}}
+    return root, needed, {"scene": dict(closed, properties=scene, required=scene_needed), "reference": reference}
+
+
 def main():
     page = sys.argv[1]
     name = re.search(r"(\w+)\.md$", page)[1]
-    root, needed = {"results": results, "grades": grades}[name](page)
+    root, needed, *defs = {"results": results, "grades": grades, "suite": suite}[name](page)
     schema = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": f"{'results' if name == 'results' else 'grade'}.json of assay",
+        "title": {"results": "results.json", "grades": "grade.json", "suite": "suite.json"}[name] + " of assay",
         "description": f"Made by tools/packaging/schemas.py from tools/docs/formats/{name}.md. Units are in brackets.",
         "type": "object", "properties": root, "required": needed,
     }
-    if name == "results":
+    if name != "grades":
         schema["additionalProperties"] = False
+    if defs:
+        schema["$defs"] = defs[0]
     print(json.dumps(schema, indent=1, ensure_ascii=False))
 
 

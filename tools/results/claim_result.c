@@ -66,8 +66,10 @@ static json_t *claim_head(const struct claim_context *c)
                   c->opt.margin_global, "margin_tile", c->opt.margin_tile, "tile", c->opt.tile);
     if (j != NULL && c->scene != NULL) {
         json_object_set_new(j, "title", json_string(c->scene->title));
-        json_object_set_new(j, "detects", json_string(c->scene->detects));
-        json_object_set_new(j, "blind_to", json_string(c->scene->blind_to));
+        if (c->scene->detects[0] != '\0')
+            json_object_set_new(j, "detects", json_string(c->scene->detects));
+        if (c->scene->blind_to[0] != '\0')
+            json_object_set_new(j, "blind_to", json_string(c->scene->blind_to));
     }
     if (j != NULL && c->accept_mdb[0] > 0) {
         json_object_set_new(j, "accept_mdb",

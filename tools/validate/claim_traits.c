@@ -132,6 +132,9 @@ static bool scene_traits(const struct suite_scene *s, uint64_t *bits, struct err
 {
     struct scene scene;
     struct camera camera;
+    *bits = s->width != s->height ? bit(TRAIT_NOT_SQUARE) : 0;
+    if (s->is_opaque)
+        return true;
     if (!suite_open(s, &scene, &camera, e))
         return false;
     const unsigned features = features_of_scene(&scene, &camera);

@@ -51,7 +51,7 @@ static void add_place(struct words *w, const char *option, const char *place, st
 static char *rerun_command(const struct validation *v, const struct claim_run *t)
 {
     const struct validate_options *o = v->opt;
-    const struct data_dirs at = data_dirs_find();
+    const struct data_dirs at = data_dirs_of_suite(NULL);
     struct words w = {.num = 0};
     char name[CLAIM_NAME];
     claim_run_name(t, name);

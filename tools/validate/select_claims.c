@@ -141,7 +141,9 @@ static void init_sides(struct validation *v)
         for (int k = 0; k < s->num_references; k++) {
             const struct suite_reference *ref = &s->reference[k];
             own->reference[k] = (struct side){.kind = strcmp(ref->engine, "truth") == 0 ? SIDE_TRUTH
-                                                      : v->opt->live                    ? SIDE_LIVE
+                                                      : strcmp(ref->engine, "pathtracer") == 0
+                                                          ? SIDE_OURS
+                                                      : v->opt->live ? SIDE_LIVE
                                                                      : SIDE_GOLDEN,
                                               .name = ref->engine,
                                               .scene = s,
@@ -191,7 +193,7 @@ static void add_task(struct validation *v, const struct suite_scene *s, struct s
     claim_next_look(t);
 }
 
-/* In the order of the results: ours against each reference; each engine against the closed form, where
+/* In the order of the results, of a suite of ours: ours against each reference; each engine against the closed form, where
  * there is one: the probes that show the engine to be set up right; a further engine against all of
  * these and ours; variants; consistency; noise. */
 static void add_scene(struct validation *v, const struct suite_scene *s, bool engine_can,
@@ -203,6 +205,11 @@ static void add_scene(struct validation *v, const struct suite_scene *s, bool en
     const struct suite_reference *truth = suite_reference_of(s, "truth");
     struct suite_reference self = {.engine = "pathtracer", .fidelity = "exact"};
     int t = truth != NULL ? (int)(truth - s->reference) : 0;
+    if (v->suite.is_own) { /* it is about the engine alone */
+        for (int i = 0; engine_can && i < s->num_references; i++)
+            add_task(v, s, &own->engine, &from[i], &s->reference[i], s->expect);
+        return;
+    }
     for (int i = 0; i < s->num_references; i++)
         add_task(v, s, &own->ours, &from[i], &s->reference[i], s->expect);
     for (int i = 0; truth != NULL && i < s->num_references; i++)

@@ -8,6 +8,7 @@
 #include "noise_ladder.h"
 #include "validate_internal.h"
 
+#include <limits.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -200,6 +201,20 @@ static bool check_loader(const struct validation *v, const struct import_options
     return ok;
 }
 
+/* From whatever folder it was started. */
+static void tell_where(const struct validation *v)
+{
+    const struct validate_options *o = v->opt;
+    char suite[PATH_MAX + 1], golden[PATH_MAX + 1];
+    if (o->quiet)
+        return;
+    fprintf(stderr, "suite %s (%d scene%s), goldens %s%s%s\n",
+            realpath(o->suite_dir, suite) != NULL ? suite : o->suite_dir, v->suite.num_scenes,
+            v->suite.num_scenes > 1 ? "s" : "",
+            realpath(o->golden_dir, golden) != NULL ? golden : o->golden_dir,
+            o->engine != NULL ? ", engine " : "", o->engine != NULL ? o->engine->file : "");
+}
+
 bool validate(const struct validate_options *opt, int argc, char **argv, json_t **results,
               struct err *e)
 {
@@ -215,6 +230,7 @@ bool validate(const struct validate_options *opt, int argc, char **argv, json_t 
     bool ok = fs_make_dirs(opt->out_dir, e) && select_claims(&v, cannot, e);
     if (!ok)
         goto done;
+    tell_where(&v);
     /* Bonferroni over the claims of this run: one alpha for the whole family. */
     v.alpha = opt->alpha / (opt->of_claims > 0 ? opt->of_claims : v.num_tasks);
     ok = validate_start(opt, argc, argv, &root, e);

@@ -1,5 +1,6 @@
 #include "validate_command.h"
 
+#include "reference/suite/suite_own.h"
 #include "renderer/base/cli.h"
 #include "renderer/base/fs.h"
 #include "tools/results/plain_words.h"
@@ -36,8 +37,12 @@ static const struct cli_option options[] = {
      "DIFFERENT and for wrong EQUIVALENT each, down to 1e-12 (1e-3)",
      TO(opt.alpha), 1e-12, 0.4},
     {'o', "out", "DIR", "report, results and images (build/report)", TO(opt.out_dir)},
-    {0, "suite", "DIR", "the scenes (reference/scenes)", TO(opt.suite_dir)},
-    {0, "golden", "DIR", "stored references (golden)", TO(opt.golden_dir)},
+    {0, "suite", "DIR",
+     "the scenes (that of the folder, if it has a suite.json, else\n"
+     "reference/scenes)",
+     TO(opt.suite_dir)},
+    {0, "golden", "DIR", "stored references (golden; of a suite.json golden beside it)",
+     TO(opt.golden_dir)},
     {0, "share", "DIR", "where cycles.py is (reference)", TO(opt.share_dir)},
     {0, "pathtracer", "FILE", "the program under test (beside this one)", TO(opt.pathtracer)},
     {0, "engine", "FILE",
@@ -81,11 +86,31 @@ static const struct cli_option options[] = {
     {'h', "help", "", "print this", TO(help), .usage = "usage: assay validate [options]\n"},
     {0}};
 
+/* A suite of one's own says what it judges, and stores what that is held against. */
+static bool ask_own_suite(struct validate_command *c, struct err *e)
+{
+    struct suite suite;
+    if (c->opt.live)
+        return err_set(
+            e,
+            "--live renders Cycles and POV-Ray anew, for our scenes: the references of %s/suite.json are stored (assay golden render)",
+            c->opt.suite_dir);
+    if (!suite_load(c->opt.suite_dir, &suite, e))
+        return false;
+    if (c->engine_file == NULL)
+        snprintf(c->own_engine, sizeof c->own_engine, "%s", suite.engine);
+    suite_free(&suite);
+    return c->engine_file != NULL || c->own_engine[0] != '\0' ||
+           err_set(e, "%s/suite.json names no 'engine': give --engine FILE", c->opt.suite_dir);
+}
+
 /* A name alone is one of those that came with us. */
 static bool load_engine(struct validate_command *c, struct err *e)
 {
     const char *file = c->engine_file;
     c->opt.engine = &c->engine;
+    if (file == NULL)
+        return engine_load(c->own_engine, &c->engine, e);
     return engine_load(strpbrk(file, "./") != NULL
                            ? file
                            : fs_path("%s/engines/%s.json", c->opt.share_dir, file).s,
@@ -201,17 +226,21 @@ bool validate_command_read(int argc, char **argv, struct validate_command *c, st
                                        .alpha = 1e-3,
                                        .seed = 1,
                                        .timeout_s = 3600,
-                                       .suite_dir = c->at.suite.s,
-                                       .golden_dir = c->at.golden.s,
                                        .share_dir = c->at.share.s,
                                        .show = write_page_so_far};
     if (!cli_read(options, argc, argv, c, e) || c->help)
         return c->help;
+    c->at = data_dirs_of_suite(c->opt.suite_dir);
+    c->opt.suite_dir = c->at.suite.s;
+    if (c->opt.golden_dir == NULL)
+        c->opt.golden_dir = c->at.golden.s;
+    if (suite_own_is(c->opt.suite_dir) && !ask_own_suite(c, e))
+        return false;
     uint32_t *seed = &c->opt.reference_seed;
     if (c->opt.live && !c->has_reference_seed &&
         getrandom(seed, sizeof *seed, 0) != (ssize_t)sizeof *seed)
         return err_set(e, "no random numbers from the system; give --reference-seed");
-    if (c->engine_file != NULL && !load_engine(c, e))
+    if ((c->engine_file != NULL || c->own_engine[0] != '\0') && !load_engine(c, e))
         return false;
     if (c->opt.threads == 0)
         c->opt.threads = cli_processors();

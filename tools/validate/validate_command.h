@@ -9,6 +9,7 @@ struct validate_command {
     struct validate_options opt;
     struct engine engine;    /* opt.engine, where there is one; the caller calls engine_free() */
     const char *engine_file; /* or a name; NULL: none */
+    char own_engine[4096];   /* what a suite.json names instead; empty: none */
     bool has_reference_seed;
     bool slurm, help;    /* help: it was printed, and opt is not complete */
     struct data_dirs at; /* for the options that are not given */

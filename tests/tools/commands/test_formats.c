@@ -244,7 +244,7 @@ static bool reads_scenes(json_t *scenes)
 
 static bool knows_scene_key(const char *word)
 {
-    json_t *scenes = json_pack("[o, o]", load_block("suite.md", 0), load_block("suite.md", 1));
+    json_t *scenes = json_pack("[o, o]", load_block("scene.md", 0), load_block("scene.md", 1));
     bool known = is_known_in(scenes, scenes, word, reads_scenes);
     json_decref(scenes);
     return known;
@@ -254,7 +254,7 @@ TEST(scenes_are_as_their_page_says)
 {
     struct suite s;
     struct err e;
-    json_t *a = load_block("suite.md", 0), *b = load_block("suite.md", 1);
+    json_t *a = load_block("scene.md", 0), *b = load_block("scene.md", 1);
     MUST(load_scenes(a, b, &s, &e));
     assert_int_equal(s.num_scenes, 2);
     assert_int_equal(s.scene[0].num_references, 3);
@@ -262,7 +262,63 @@ TEST(scenes_are_as_their_page_says)
     suite_free(&s);
     json_decref(a);
     json_decref(b);
-    compare("suite.md", "key", (const char *const[]){"reference/suite", NULL}, knows_scene_key);
+    compare("scene.md", "key", (const char *const[]){"reference/suite", NULL}, knows_scene_key);
+}
+
+/* Names of scenes and references are free: a key is tried in the suite, in its first scene and in a reference of each kind. */
+static bool knows_suite_key(const char *word)
+{
+    static const char *const places[][4] = {{NULL},
+                                            {"scenes", "ball", NULL},
+                                            {"scenes", "ball", "references", "other"},
+                                            {"scenes", "ball", "references", "truth"},
+                                            {"scenes", "ball", "references", "povray"}};
+    bool known = false;
+    for (size_t i = 0; i < sizeof places / sizeof *places; i++) {
+        struct suite s;
+        struct err e;
+        json_t *suite = load_block("suite.md", 0), *at = suite;
+        json_t *references = json_object_get(
+            json_object_get(json_object_get(suite, "scenes"), "ball"), "references");
+        json_object_set_new(references, "truth",
+                            json_pack("{ss,s{}}", "kind", "furnace", "values"));
+        json_object_set_new(references, "povray",
+                            json_pack("{si,si}", "replicates", 8, "subgrid", 2));
+        for (size_t k = 0; k < 4 && places[i][k] != NULL; k++)
+            at = json_object_get(at, places[i][k]);
+        assert_true(json_is_object(at));
+        json_object_set_new(at, word, json_pack("[[]]"));
+        dump(suite, "own/suite.json");
+        json_decref(suite);
+        if (suite_load(test_path("own"), &s, &e)) {
+            suite_free(&s);
+            known = true;
+        } else {
+            known |= strstr(e.msg, "unknown key") == NULL;
+        }
+    }
+    return known;
+}
+
+TEST(suites_of_ones_own_are_as_their_page_says)
+{
+    static const char *const files[] = {"own/mine.json", "own/scenes/box.json",
+                                        "own/scenes/wood.png", "own/scenes/ball.dae",
+                                        "own/scenes/ball_dark.dae"};
+    struct suite s;
+    struct err e;
+    json_t *suite = load_block("suite.md", 0);
+    MUST(fs_make_dirs(test_path("own/scenes"), &e));
+    for (size_t i = 0; i < sizeof files / sizeof *files; i++)
+        write_text(files[i], "a file");
+    dump(suite, "own/suite.json");
+    json_decref(suite);
+    MUST(suite_load(test_path("own"), &s, &e));
+    assert_int_equal(s.num_scenes, 3);
+    assert_int_equal(s.scene[0].num_references, 3);
+    assert_int_equal(s.scene[1].expect, VERDICT_DIFFERENT);
+    suite_free(&s);
+    compare("suite.md", "key", (const char *const[]){"reference/suite", NULL}, knows_suite_key);
 }
 
 /* Loads a description; false where the error has these words. */

@@ -1,0 +1,141 @@
+#!/bin/bash
+# tests/end_to_end/own_suite.sh BUILD: the guide to a suite of one's own, command by command, in an empty folder, with the program installed
+# and with a renderer that is not ours; what else a suite.json may ask for; the workflow that `assay init` writes. Prints "ok NAME",
+# "not ok NAME: why" or "skip NAME".
+set -u
+build=$(realpath "${1:?usage: tests/end_to_end/own_suite.sh BUILD}")
+tmp=$(mktemp -d) top=$PWD
+trap 'rm -rf "$tmp"' EXIT
+failures=0 what="own suite"
+. tests/end_to_end/expect.sh
+
+make -s install BUILD="$build" PREFIX="$tmp/usr" >"$tmp/install.log" 2>&1
+tell "it installs" "$([ -x "$tmp/usr/bin/assay" ] || tail -n 3 "$tmp/install.log")"
+export PATH=$tmp/usr/bin:/usr/bin:$PATH
+mkdir "$tmp/walk" "$tmp/free"
+cd "$tmp/free" || exit 1
+
+# A folder that works, wherever one stands.
+expect "init" 0 "\`assay validate --suite .*/free/begun\` is green" assay init "$tmp/free/begun"
+expect "init does not write over what is there" 3 "begun/suite.json is there already" assay init begun
+expect "it is green from another folder" 0 "result: all as it should be, 1 the same" assay validate --suite begun --out report
+tell "validate says where it looked" "$(grep -qx "suite $tmp/free/begun (1 scene), goldens $tmp/free/begun/golden, engine $tmp/free/begun/mine.json" "$tmp/err" || cat "$tmp/err")"
+expect "goldens are current" 0 "current  cornell/mine-1.0" env -C begun assay golden status
+again=$(python3 -c "import json; print(json.load(open('report/results.json'))['claims'][0]['rerun'])")
+expect "the command of a claim runs as it is printed" 0 "result: all as it should be" bash -c "$again"
+expect "outside a suite ours are looked for where they are installed" 3 "no scene 'x' in .*/share/assay/scenes" assay validate --only x
+
+# References of any kind: another engine's name, ours, a closed form that a program writes, one that must come out different.
+cp -r begun many
+sed -i 's/"replicates": 64/"replicates": 16/' many/mine.json
+cat >many/closed.sh <<'END'
+#!/bin/sh
+# SCENE OUT: a furnace: emission (1 + albedo), as it is seen with one bounce
+printf 'PF\n16 16\n-1.0\n' >"$2"
+python3 -c 'import array, sys; sys.stdout.buffer.write(array.array("f", [1.2 * 1.3, 0.8 * 1.6, 0.4 * 1.9] * 256).tobytes())' >>"$2"
+END
+chmod +x many/closed.sh
+echo '{"name": "closed", "format": "file", "command": ["./closed.sh", "{scene}", "{out}"], "output": "exact", "image": "pfm"}' >many/closed.json
+echo '{"name": "dae", "format": "dae", "command": ["./mine.sh", "{scene}", "{width}", "{height}", "{spp}", "{depth}", "{seed}", "{out}"], "output": "mean", "expresses": ["diffuse"], "replicates": 8}' >many/dae.json
+cp "$top/reference/scenes/10_furnace_one.dae" many/scenes/furnace.dae
+cat >many/suite.json <<'END'
+{
+  "engine": "mine.json", "margin": 0.02,
+  "scenes": {
+    "furnace": { "file": "scenes/furnace.dae", "width": 16, "height": 16, "depth": 1, "references": { "closed": {}, "pathtracer": {"spp": 16} } },
+    "cut": { "file": "scenes/cornell.dae", "width": 64, "height": 64, "depth": 1, "expect": "DIFFERENT", "references_of": "cornell" },
+    "cornell": { "file": "scenes/cornell.dae", "width": 64, "height": 64, "references": { "mine-1.0": {"replicates": 64} } }
+  }
+}
+END
+cd many || exit 1
+expect "a reference that is missing is named, with what makes it" 3 "no golden of closed: \`assay golden render --engine FILE\` makes it" assay validate -q --only furnace
+expect "a closed form is stored" 0 "furnace/closed.exr: 16 x 16 pixels, 1 x exact" assay golden render --engine closed.json
+expect "and approved" 0 "1 approved" assay golden approve --new furnace/closed
+expect "all of these are as expected" 0 "all as it should be, 3 the same within their margins, 1 deliberate mistake" assay validate -q
+expect "an engine that is no reference" 3 "dae: is it one of .*mine-1.0.*give --as NAME" assay golden render --engine dae.json
+expect "what an engine cannot express is said" 0 "dae cannot express cornell: the description does not list: area" assay golden render --engine dae.json --as mine-1.0
+expect "--live is for our scenes" 3 "references of ./suite.json are stored" assay validate -q --live
+sed -i 's/"replicates": 64}/"replicates": 65}/' suite.json
+expect "a reference that was made otherwise is stale" 3 "golden has replicates 64, the suite wants 65" assay validate -q --only cornell
+sed -i 's/"margin": 0.02/"margins": 0.02/' suite.json
+expect "a mistake in suite.json" 3 "suite.json: unknown key 'margins'" assay validate -q
+tell "and in one that a schema sees" "$(/usr/bin/python3 - "$top/tools/docs/formats/suite.schema.json" ../begun/suite.json suite.json <<'END' 2>&1
+import json, sys
+try:
+    import jsonschema
+except ImportError:
+    sys.exit()
+check = jsonschema.Draft202012Validator(json.load(open(sys.argv[1])))
+check.check_schema(check.schema)
+for path, wanted in zip(sys.argv[2:], (0, 1)):
+    errors = list(check.iter_errors(json.load(open(path))))
+    if len(errors) != wanted:
+        print(path, errors)
+END
+)"
+cd ..
+# Pixels that share samples: every image is blurred.
+cp -r begun blurred
+cat >blurred/mine.sh <<'END'
+#!/bin/sh
+exec python3 - "$2" "$3" "$6" "$7" <<'PY'
+import random, array, sys
+w, h, seed = map(int, sys.argv[1:4])
+r = random.Random(seed)
+x = [[r.random() for _ in range(w + 1)] for _ in range(h + 1)]
+px = array.array("f", [(x[j][i] + x[j + 1][i] + x[j][i + 1] + x[j + 1][i + 1]) / 4 for j in range(h) for i in range(w) for _ in range(3)])
+open(sys.argv[4], "wb").write(b"PF\n%d %d\n-1.0\n" % (w, h) + px.tobytes())
+PY
+END
+sed -i 's/"exr"/"pfm"/; s/64/16/' blurred/mine.json
+tell "replicates whose pixels share noise make no reference" "$(env -C blurred assay golden render --engine mine.json 2>&1 | grep -q 'cornell, mine: pixels share their noise' ||
+    echo "no such line")"
+
+if ! python3 -c 'import numpy' 2>/dev/null; then
+    echo "skip own suite: the guide (no python3-numpy)"
+    exit $((failures > 0))
+fi
+# The guide: indented lines, but what programs print.
+cd "$tmp/walk" || exit 1
+cp "$top/tests/end_to_end/tracer.py" .
+echo '{"floor": [0.5, 0.5, 0.5], "lamp": {"height": 3, "size": 1, "radiance": 20}, "balls": [{"at": [0, 0.5, 0], "radius": 0.5, "albedo": [0.7, 0.3, 0.2]}]}' >ball.json
+echo '{"floor": [0.6, 0.6, 0.6], "lamp": {"height": 3, "size": 2, "radiance": 5}, "balls": [{"at": [-0.6, 0.5, 0], "radius": 0.5, "albedo": [0.2, 0.6, 0.3]}, {"at": [0.5, 0.4, 0.4], "radius": 0.4, "albedo": [0.8, 0.8, 0.8]}]}' >two.json
+guide() { sed -n 's/^    //p' "$top/tools/docs/guide-own-suite.md" | grep -v '^result:'; }
+guide | sed '/^cd \.\.$/,$d' >first.sh
+guide | sed -n '/^cd \.\.$/,$p' | sed 1d >second.sh
+bash -c 'trap '\''s=$?; echo "status $s: $BASH_COMMAND"; [ $s -le 1 ] || exit'\'' ERR; . ./first.sh' >first.out 2>&1 </dev/null
+tell "the guide: green, red, green" "$(grep -oE '^result: (all as it should be, [0-9]+|2 of 2 not as it should be: mine is [0-9.]+ % too dark)|^status .*' first.out | sed 's/[0-9.]* % too dark/dark/' |
+    diff - <(printf '%s\n' 'result: all as it should be, 1' 'result: all as it should be, 2' 'result: 2 of 2 not as it should be: mine is dark' \
+        'status 1: assay validate' 'result: all as it should be, 2') || tail -n 5 first.out)"
+tell "CI has the line where it is wrong" "$(grep -q '^::error title=ball.*DIFFERENT, expected EQUIVALENT' first.out || grep '^::' first.out)"
+tell "control: no other line of the guide fails" "$(grep -c '^status' first.out | grep -vx 1)"
+
+# Each step of the workflow, in a repository as it asks for.
+mkdir "$tmp/bin"
+ln -s "$top" assay
+printf '#!/bin/sh\n' | tee build.sh >"$tmp/bin/apt-get"
+chmod +x build.sh "$tmp/bin/apt-get"
+workflow() {
+    sed -n 's/^ *run: //p' renders/renders.yml | while IFS= read -r line; do
+        PATH=$tmp/bin:$PATH bash -ec "$line" </dev/null >step.out 2>&1 || echo "$line: status $?"
+        cat step.out >>workflow.out
+    done
+}
+tell "the workflow is green" "$(workflow)"
+sed -i 's/bounce in range(2)/bounce in range(1)/' tracer.py
+rm workflow.out
+tell "and red where the renderer is wrong" "$(workflow | diff - <(echo 'assay/build/assay validate --suite renders --out report: status 1') && grep -q '^::error title=two' workflow.out ||
+    tail -n 3 workflow.out)"
+sed -i 's/bounce in range(1)/bounce in range(2)/' tracer.py
+
+if ! python3 -c 'import pytest' 2>/dev/null; then
+    echo "skip own suite: the guide in Python alone (no python3-pytest)"
+    exit $((failures > 0))
+fi
+export PYTHONPATH=$top/tools/python ASSAY_LIBRARY=$tmp/usr/lib/libassay.so.1 PYTHONDONTWRITEBYTECODE=1
+bash ./second.sh >second.out 2>&1 </dev/null
+tell "the guide in Python alone: green, red, green" "$(grep -oE '^[0-9]+ (passed|failed)' second.out | diff - <(printf '2 passed\n2 failed\n2 passed\n') || tail -n 5 second.out)"
+tell "pytest says the verdict, the place and the page" "$(grep -q 'AssertionError: DIFFERENT: ' second.out && grep -q 'worst: ' second.out && grep -q 'page: assay-reports/' second.out ||
+    grep '^E' second.out | head -n 5)"
+exit $((failures > 0))

@@ -1,0 +1,53 @@
+#include "renderer/base/cli.h"
+#include "renderer/base/fs.h"
+#include "tools/base/data_dirs.h"
+#include "tools/golden/starter.h"
+#include "tools/results/results.h"
+#include "commands.h"
+
+#include <stdio.h>
+#include <string.h>
+
+struct settings {
+    const char *dir[1];
+    int num_dirs;
+    bool help;
+};
+
+static const struct cli_option options[] = {
+    {'h', "help", "", "print this", CLI_TO(struct settings, help),
+     .usage =
+         "usage: assay init [DIR]\n\n"
+         "Writes a suite of your own into DIR (the current folder): a scene, how to call your renderer,\n"
+         "what it is held against, a CI file, and a README that says what to do next.\n"},
+    {.noun = "folders", CLI_TO_LIST(struct settings, dir, num_dirs)}};
+
+int command_init(int argc, char **argv, struct err *e)
+{
+    struct settings s = {.dir = {"."}};
+    const struct data_dirs at = data_dirs_find();
+    if (!cli_read(options, argc, argv, &s, e))
+        return EXIT_NOT_JUDGED;
+    if (s.help)
+        return 0;
+    struct path suite = fs_path("%s", s.dir[0]), engine = fs_path("%s/mine.json", s.dir[0]);
+    struct path work = fs_path("%s/build/work", s.dir[0]);
+    struct path candidate = fs_path("%s/build/golden-candidate", s.dir[0]);
+    char word[][12] = {"golden", "render",  "--suite", "--engine", "--work",
+                       "--out",  "approve", "--from",  "--new",    "--all"};
+    char *render[] = {word[0], word[1], word[2], suite.s,     word[3], engine.s,
+                      word[4], work.s,  word[5], candidate.s, NULL};
+    char *approve[] = {word[0],     word[6], word[2], suite.s, word[7],
+                       candidate.s, word[8], word[9], NULL};
+    if (!starter_write(s.dir[0], at.share.s, e))
+        return EXIT_NOT_JUDGED;
+    int code = command_golden(10, render, e);
+    code = code == 0 ? command_golden(8, approve, e) : code;
+    if (code == 0 && !fs_remove_tree(fs_path("%s/build", s.dir[0]).s, e))
+        code = EXIT_NOT_JUDGED;
+    if (code == 0)
+        printf("\n%s: `assay validate%s%s` is green; README.md there says what to do next\n",
+               s.dir[0], strcmp(s.dir[0], ".") != 0 ? " --suite " : "",
+               strcmp(s.dir[0], ".") != 0 ? s.dir[0] : "");
+    return code;
+}
