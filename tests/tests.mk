@@ -2,7 +2,7 @@
 
 SECONDS_EACH ?= 60
 DEPS_TEST := libcmocka-dev zip ccache clang libclang-rt-dev libxml2-utils libembree-dev patch openimageio-tools chromium \
-  $(DEPS_DEB) python3-numpy python3-jsonschema python3-pytest python3-venv python3-pip python3-setuptools python3-wheel \
+  $(DEPS_DEB) locales python3-numpy python3-jsonschema python3-pytest python3-venv python3-pip python3-setuptools python3-wheel \
   $(if $(shell command -v npm),,nodejs npm)
 DEPS_LINT := clang-tidy cppcheck llvm
 DEPS_SLURM := slurm-wlm munge

@@ -118,6 +118,8 @@ const char *channel_of(const struct oiio_image *p, int c)
 bool read_image(struct oiio_image *p, float *data, char *why, size_t size)
 {
     return guarded(why, size, [&]() -> std::string {
+        if (p->in->spec().deep)
+            return "has deep pixels";
         if (!p->in->read_image(0, 0, 0, p->in->spec().nchannels, OIIO::TypeDesc::FLOAT, data))
             return "cannot read: " + p->in->geterror();
         return "";

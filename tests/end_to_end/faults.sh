@@ -1,14 +1,14 @@
 #!/bin/bash
-# tests/end_to_end/faults.sh BUILD [KILLS [PART...]]: what goes wrong outside the program. kill -9 at KILLS random moments (6) each of a
+# tests/end_to_end/faults.sh BUILD [KILLS [PART...]]: what goes wrong, or is other, outside the program. kill -9 at KILLS random moments (6) each of a
 # render, a golden update, a grading batch, a report and a validation: no output is ever half written, going on ends with the bits
-# of an uninterrupted run. Full disk, read-only directory, closed pipe. Prints "ok NAME" or "not ok NAME: why".
-# PARTs: kill_renders kill_golden kill_grading kill_report kill_validation disk clock ours_to_mend (all these; disk uses what grading and
+# of an uninterrupted run. Full disk, read-only directory, closed pipe, a decimal comma. Prints "ok NAME" or "not ok NAME: why".
+# PARTs: kill_renders kill_golden kill_grading kill_report kill_validation disk clock comma ours_to_mend (all these; disk uses what grading and
 # validation leave); memory: tests/end_to_end/no_memory.sh with every allocation (an hour).
 set -u
 build=$(realpath "${1:?usage: tests/end_to_end/faults.sh BUILD [KILLS [PART...]]}") kills=${2:-6}
 shift $(($# > 2 ? 2 : $#))
-[ $# -gt 0 ] || set -- kill_renders kill_golden kill_grading kill_report kill_validation disk clock ours_to_mend
-pathtracer=$build/pathtracer assay=$build/assay scene=$PWD/reference/scenes/41_cornell.dae
+[ $# -gt 0 ] || set -- kill_renders kill_golden kill_grading kill_report kill_validation disk clock comma ours_to_mend
+pathtracer=$build/pathtracer assay=$build/assay root=$PWD scene=$PWD/reference/scenes/41_cornell.dae
 tmp=$(mktemp -d)
 # What is killed here, or has no disk, keeps no counts for tests/end_to_end/coverage.sh (LLVM_PROFILE_FILE): it would spoil those of the others.
 trap 'rm -rf "$tmp"' EXIT
@@ -310,6 +310,32 @@ clock() {
     timeout --preserve-status -k 60 -s INT 2 env LD_PRELOAD="$so" "$pathtracer" -q -r 32 32 -s 16000000 -f "$tmp/clock.exr" "$scene" >/dev/null 2>&1
     [ $? -eq 130 ] || why="${why:-an interrupted render ended otherwise}"
     tell "clock jumps of an hour: --time, --write-every and Ctrl-C" "$why"
+}
+
+# A country where numbers have a decimal comma: every file and table is the same. Control: printf of the system writes a comma there.
+comma() {
+    local why="" at
+    export LOCPATH=$tmp/locale
+    mkdir -p "$LOCPATH"
+    if ! localedef -i de_DE -f UTF-8 "$LOCPATH/de_DE.UTF-8" 2>"$tmp/err"; then
+        unset LOCPATH
+        echo "skip a decimal comma: $(head -n 1 "$tmp/err")"
+        return
+    fi
+    [ "$(LC_ALL=de_DE.UTF-8 /usr/bin/printf %.1f 0,5)" = 0,5 ] || why="no comma in that country"
+    for at in C de_DE.UTF-8; do
+        mkdir -p "$tmp/comma/$at/right"
+        (cd "$tmp/comma/$at" && export LC_ALL=$at
+            "$pathtracer" -q -s 16 -r 32 32 --seed 1 -b 0.05 -d 2.5 --keep-state -f a.exr -f a.png "$scene" && "$pathtracer" -q -s 16 -r 32 32 --seed 2 -f b.exr "$scene"
+            "$assay" export -o a.pov "$scene" && "$assay" compare --margin 0.01 a.exr b.exr
+            "$pathtracer" -q -s 16 -m 1 -r 64 64 -f right/point.png "$root/reference/scenes/12_point_plane.dae"
+            "$assay" grade -q -o grades "$root/tests/end_to_end/quick.rubric" right; cat grades/grades.csv
+            "$assay" validate -q --only 12_point_plane -o suite | sed 's/[0-9.]*e+0[0-9] */TIMED /') >"$tmp/comma/$at.out" 2>&1
+    done
+    unset LOCPATH
+    for at in a.exr.state a.png a.pov; do cmp "$tmp/comma/C/$at" "$tmp/comma/de_DE.UTF-8/$at" >>"$tmp/comma/why" 2>&1 || why="${why:-$at: $(cat "$tmp/comma/why")}"; done
+    grep -q 8.00,8, "$tmp/comma/C.out" || why="${why:-$(cat "$tmp/comma/C.out")}"
+    tell "a decimal comma: the same files and tables" "${why:-$(diff "$tmp/comma/C.out" "$tmp/comma/de_DE.UTF-8.out")}"
 }
 
 # A right program whose grading lacks something: all points, or none are said and exit 3 with a line; never fewer. The control is a wrong

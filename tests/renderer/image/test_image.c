@@ -6,6 +6,8 @@
 #include "reference/base/process.h"
 #include "tests/support/test.h"
 
+#include <openexr.h>
+
 enum { WIDTH = 37, HEIGHT = 29, CHANNELS = 5, MAX_FILE = 1 << 16 };
 static const char *const channel[CHANNELS] = {"R", "G", "B", "variance.R", "Z"};
 
@@ -272,6 +274,54 @@ TEST(damaged_files)
             bytes[at] = before;
         }
     }
+}
+
+/* A file by OpenEXR's own writer: 4 lines of 8 pixels, uncompressed; deep: a sample for each pixel, whose number comes with it. */
+static bool write_by_openexr(const char *path, exr_storage_t storage, exr_pixel_type_t type)
+{
+    enum { W = 8, H = 4 };
+    int part, samples[W];
+    float light[W];
+    exr_context_t f = NULL;
+    for (int x = 0; x < W; x++) {
+        light[x] = 0.5f + (float)x;
+        samples[x] = x + 1; /* counts so far */
+    }
+    bool ok =
+        exr_start_write(&f, path, EXR_WRITE_FILE_DIRECTLY, NULL) == EXR_ERR_SUCCESS &&
+        exr_add_part(f, "lines", storage, &part) == EXR_ERR_SUCCESS &&
+        exr_initialize_required_attr_simple(f, part, W, H, EXR_COMPRESSION_NONE) ==
+            EXR_ERR_SUCCESS &&
+        exr_add_channel(f, part, "R", type, EXR_PERCEPTUALLY_LINEAR, 1, 1) == EXR_ERR_SUCCESS &&
+        (storage == EXR_STORAGE_SCANLINE || exr_set_version(f, part, 1) == EXR_ERR_SUCCESS) &&
+        exr_write_header(f) == EXR_ERR_SUCCESS;
+    for (int y = 0; ok && y < H; y++)
+        ok = (storage == EXR_STORAGE_SCANLINE
+                  ? exr_write_scanline_chunk(f, part, y, light, sizeof light)
+                  : exr_write_deep_scanline_chunk(f, part, y, light, sizeof light, sizeof light,
+                                                  samples, sizeof samples)) == EXR_ERR_SUCCESS;
+    return exr_finish(&f) == EXR_ERR_SUCCESS && ok;
+}
+
+/* Control: floats, by the same writer. */
+TEST(deep_pixels_and_whole_numbers_are_refused)
+{
+    char path[256];
+    struct image im;
+    struct err e;
+    bool half;
+    assert_true(
+        write_by_openexr(path_of(path, "plain.exr"), EXR_STORAGE_SCANLINE, EXR_PIXEL_FLOAT));
+    MUST(image_read_exr(path, &im, &half, &e));
+    assert_true(im.width == 8 && im.height == 4 && im.data[0] == 0.5f && im.data[31] == 7.5f);
+    image_free(&im);
+    assert_true(write_by_openexr(path_of(path, "whole.exr"), EXR_STORAGE_SCANLINE, EXR_PIXEL_UINT));
+    REFUSES(image_read_exr(path, &im, &half, &e), "whole.exr: channel R is not a float");
+    assert_true(
+        write_by_openexr(path_of(path, "deep.exr"), EXR_STORAGE_DEEP_SCANLINE, EXR_PIXEL_FLOAT));
+    REFUSES(image_read_exr(path, &im, &half, &e), "deep.exr: has deep pixels");
+    REFUSES(image_read_exr_head(path, &im, &e), "deep.exr: has deep pixels");
+    REFUSES(image_read(path, &im, &half, &e), "deep.exr: has deep pixels");
 }
 
 static int setup(void **state)
