@@ -82,8 +82,9 @@ static bool inflates_within(z_stream *z, FILE *f, long length, double *left)
 }
 
 /* Why a PNG is not to be read, or NULL. The library reserves what a chunk says it is long, up to 2 GiB, before it looks [PNG 5.3], and
- * inflates all that a stream holds, a thousandfold of the file, though the pixels are known to be fewer. f: after the signature. */
-static const char *png_refusal(FILE *f, long size)
+ * inflates all that a stream holds, a thousandfold of the file, though the pixels are known to be fewer. pixels: they are to be read; how many there are may be wrong for the
+ * caller, who is told at no cost. f: after the signature. */
+static const char *png_refusal(FILE *f, long size, bool pixels)
 {
     enum { AROUND = 12 /* length, name, checksum */, TEXTS = 1 << 18 };
     unsigned char head[8 + 13];
@@ -101,7 +102,8 @@ static const char *png_refusal(FILE *f, long size)
         else if (memcmp(head + 4, "IHDR", 4) == 0 && length == 13 &&
                  fread(head + 8, 1, 13, f) == 13)
             left = png_bytes(head + 8);
-        else if (memcmp(head + 4, "IDAT", 4) == 0 && !inflates_within(&z, f, length, &left))
+        else if (pixels && memcmp(head + 4, "IDAT", 4) == 0 &&
+                 !inflates_within(&z, f, length, &left))
             why = "its data are more than its pixels";
         else if ((memcmp(head + 4, "zTXt", 4) == 0 || memcmp(head + 4, "iTXt", 4) == 0) &&
                  (texts += length) > TEXTS)
@@ -113,7 +115,7 @@ static const char *png_refusal(FILE *f, long size)
 }
 
 /* Which of the documented formats the file is of, by its first bytes; NULL with a line. */
-static const char *format_of(const char *path, double *size, struct err *e)
+static const char *format_of(const char *path, bool pixels, double *size, struct err *e)
 {
     struct stat st;
     FILE *f = fs_open(path);
@@ -132,7 +134,7 @@ static const char *format_of(const char *path, double *size, struct err *e)
             format = "openexr";
         why = "the file ends within its header";
     } else if (n == 8 && memcmp(head, "\x89PNG\r\n\x1a\n", 8) == 0) {
-        why = png_refusal(f, (long)st.st_size);
+        why = png_refusal(f, (long)st.st_size, pixels);
         format = why == NULL ? "png" : NULL;
     } else if (n >= 2 && head[0] == '#' && head[1] == '?') {
         format = "hdr";
@@ -175,13 +177,13 @@ static bool check_size(const char *path, const struct image_info *i, int depth, 
 }
 
 /* The library left to itself would try every reader that it has, for seconds and with gigabytes if the file is of none. */
-static struct oiio_image *open_image(const char *path, const struct oiio_table **with,
+static struct oiio_image *open_image(const char *path, bool pixels, const struct oiio_table **with,
                                      struct image_info *out, struct err *e)
 {
     double size = 0, bytes = 0;
     int depth = 0;
     char why[800];
-    const char *format = format_of(path, &size, e);
+    const char *format = format_of(path, pixels, &size, e);
     *with = format != NULL ? load(e) : NULL;
     if (*with == NULL)
         return NULL;
@@ -213,7 +215,7 @@ bool image_read(const char *path, struct image *out, bool *half, struct err *e)
     struct err inner;
     char why[800];
     const char *name, *value;
-    struct oiio_image *p = open_image(path, &oiio, &info, e);
+    struct oiio_image *p = open_image(path, true, &oiio, &info, e);
     if (p == NULL)
         return false;
     bool ok = alloc_like(oiio, p, &info, &im, &inner) || err_set(e, "%s: %s", path, inner.msg);
@@ -234,7 +236,7 @@ bool image_read(const char *path, struct image *out, bool *half, struct err *e)
 bool image_inspect(const char *path, struct image_info *out, struct err *e)
 {
     const struct oiio_table *oiio;
-    struct oiio_image *p = open_image(path, &oiio, out, e);
+    struct oiio_image *p = open_image(path, false, &oiio, out, e);
     if (p == NULL)
         return false;
     out->parts = oiio->parts(p);
