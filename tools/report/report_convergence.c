@@ -92,7 +92,7 @@ static void write_scene(FILE *f, const json_t *scene)
     const char *title = member_text(scene, "title");
     html_print(f,
                "<section class=\"scene\">\n<h2>Convergence: %s <code>%s</code></h2>\n"
-               "<p class=\"lede\">%.0f × %.0f pixels, %.0f bounces, %.0f images with seeds of "
+               "<p class=\"lede\">%.0f × %.0f pixels, depth %.0f, %.0f images with seeds of "
                "their own for each number of samples. Errors are against %s (RMS noise %s). Each "
                "interval has the level %.6g\u00a0%%.</p>\n",
                title != NULL ? title : member_text(scene, "scene"), member_text(scene, "scene"),
@@ -115,7 +115,7 @@ static void write_scene(FILE *f, const json_t *scene)
 
 void report_convergence_headline(FILE *f, const json_t *convergence, bool alone)
 {
-    size_t num = 0, judged = 0, wrong = 0, errors = 0;
+    size_t num = 0, judged = 0, wrong = 0, undecided = 0, errors = 0;
     if (convergence == NULL)
         return;
     for (size_t i = 0; i < json_array_size(convergence); i++) {
@@ -125,18 +125,27 @@ void report_convergence_headline(FILE *f, const json_t *convergence, bool alone)
             const json_t *j = json_array_get(engines, k);
             enum outcome o = convergence_results_outcome(j);
             errors += o == OUTCOME_NOT_JUDGED;
-            wrong += o == OUTCOME_OPPOSITE || o == OUTCOME_UNDECIDED;
+            wrong += o == OUTCOME_OPPOSITE;
+            undecided += o == OUTCOME_UNDECIDED;
             judged += json_is_true(json_object_get(j, "judged"));
         }
     }
     const char *tag = alone ? "h1" : "p";
-    fprintf(f, "<%s class=\"%s\">", tag, !alone ? "lede" : errors + wrong == 0 ? "good" : "bad");
+    fprintf(f, "<%s class=\"%s\">", tag,
+            !alone                            ? "lede"
+            : errors + wrong + undecided == 0 ? "good"
+                                              : "bad");
     if (errors > 0)
         fprintf(f, "Convergence: %zu of %zu engines could not be judged, %zu failed.", errors, num,
                 wrong);
     else if (wrong > 0)
         fprintf(f, "Convergence: %zu of %zu judged engines did not converge as they must.", wrong,
                 judged);
+    else if (undecided > 0)
+        fprintf(f,
+                "Convergence: of %zu judged engines %zu stayed undecided; more replicates "
+                "(--replicates) or samples would tell.",
+                judged, undecided);
     else
         fprintf(f, "Convergence: %zu of %zu judged engines converge as they must.", judged, judged);
     fprintf(f, "</%s>\n", tag);
