@@ -643,6 +643,12 @@ expect "a validation of a wrong renderer" 1 "DIFFERENT" "$assay" validate --only
     --pathtracer "$plain/mutants/point_light_linear/pathtracer" --out "$tmp/wrong_suite"
 expect "diagnose: the images of a validation" 1 "tests/mutants/point_light_linear.patch" \
     "$assay" diagnose "$tmp/wrong_suite/results.json"
+# The renderer of --engine is the one that is looked at, not ours beside it, which is right.
+sed "s|{here}/mine.sh|$tmp/wrong_engine.sh|; s|\"spp\": 32, \"replicates\": 64|\"spp\": 16, \"replicates\": 16|" reference/engines/mine.json >"$tmp/wrong_engine.json"
+sed "s|^exec pathtracer|exec '$plain/mutants/point_light_linear/pathtracer'|" reference/engines/mine.sh >"$tmp/wrong_engine.sh"
+chmod +x "$tmp/wrong_engine.sh"
+expect "a validation of a wrong engine" 1 "DIFFERENT" "$assay" validate --only 12_point_plane --engine "$tmp/wrong_engine.json" --out "$tmp/wrong_engine"
+expect "diagnose: the engine of a validation" 1 "tests/mutants/point_light_linear.patch" "$assay" diagnose "$tmp/wrong_engine/results.json"
 plane="$pathtracer -q -m 1 -s 64 reference/scenes/12_point_plane.dae"
 $plane -r 48 48 -f "$tmp/plane.exr" >"$tmp/out" && $plane -r 40 40 -f "$tmp/odd.exr" >"$tmp/out"
 expect "diagnose: one image, larger than the catalogue's" 0 "nothing wrong found" \

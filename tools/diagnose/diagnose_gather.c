@@ -1,12 +1,15 @@
 #include "diagnose_gather.h"
 
 #include "diagnose_render.h"
+#include "reference/suite/engine_table.h"
 #include "tools/results/results.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
 enum { MAX_PATH = 8192 };
+static const char ours[] = "pathtracer";
 
 /* What only a comparison with the correct renderer's noise tells. */
 static void finish(struct observation *clue)
@@ -44,8 +47,8 @@ bool diagnose_gather_program(const struct diagnose_gather_options *opt, const ch
 }
 
 /* asked: 0 where an image does not say, and it matters only for adaptive sampling. */
-static bool read_image(const struct view *v, const char *path, int asked, struct observation *clue,
-                       struct err *e)
+static bool read_image(const struct view *v, const char *path, int asked, bool is_ours,
+                       struct observation *clue, struct err *e)
 {
     struct moments m;
     *clue = (struct observation){.view = v, .is_consistent = true};
@@ -53,11 +56,16 @@ static bool read_image(const struct view *v, const char *path, int asked, struct
         return false;
     bool ok = signature_of(&m, v->correct.columns, v->fixed_spp ? asked : 0, &clue->seen, e) ||
               err_prefix(e, "%s", path);
+    if (ok && !is_ours && m.spp > 0)
+        clue->seen.n *= m.spp;
     moments_free(&m);
     if (ok && clue->seen.rows != v->correct.rows)
         ok = err_set(e, "%s: width by height is not %d by %d", path, v->width, v->height);
     if (ok)
         finish(clue);
+    /* Another program may sample another way: only its means are held against bugs. */
+    for (int f = 0; ok && !is_ours && f < NUM_FACTS; f++)
+        clue->seen.fact[f] = clue->seen.fact_sd[f] = NAN;
     return ok;
 }
 
@@ -70,14 +78,34 @@ bool diagnose_gather_image(const struct diagnose_gather_options *opt, const char
     if (v == NULL)
         return err_set(e, "--scene: the catalogue of bugs has no '%s' (see --help)", view);
     return catalogue_view_scene(v, opt->suite, &scene, &variant, e) &&
-           read_image(v, path, v->spp, clue, e);
+           read_image(v, path, v->spp, true, clue, e);
+}
+
+/* The program that a validation is about: that of --engine, which is neither ours nor a reference; else ours. */
+static const char *subject_of(const json_t *results)
+{
+    static const char *const known[] = {ENGINES_WITH_GOLDENS(ENGINE_WORD) "truth"};
+    size_t i;
+    const json_t *claim;
+    json_array_foreach(json_object_get(results, "claims"), i, claim)
+    {
+        const char *a = member_text(claim, "a");
+        bool is_known = strncmp(a, ours, strlen(ours)) == 0;
+        for (size_t k = 0; k < sizeof known / sizeof *known; k++)
+            is_known |= strcmp(a, known[k]) == 0;
+        if (!is_known)
+            return a;
+    }
+    return ours;
 }
 
 /* The path of the image that claims of this scene and engine were judged by. */
 static bool find_image(const json_t *results, const char *json_path, const struct view *v,
-                       char *path)
+                       const char *subject, char *path)
 {
-    const char *engine = v->variant[0] != '\0' ? v->variant : "pathtracer";
+    const char *engine = v->variant[0] == '\0'        ? subject
+                         : strcmp(subject, ours) == 0 ? v->variant
+                                                      : "";
     size_t i;
     const json_t *claim;
     json_array_foreach(json_object_get(results, "claims"), i, claim)
@@ -122,6 +150,8 @@ bool diagnose_gather_results(const struct diagnose_gather_options *opt, const ch
         return false;
     *num = 0;
     bool ok = true;
+    const char *subject = subject_of(results);
+    const bool is_ours = strcmp(subject, ours) == 0;
     for (int i = 0; ok && i < c->num_views; i++) {
         const struct view *v = &c->view[i];
         const struct suite_scene *scene;
@@ -131,9 +161,10 @@ bool diagnose_gather_results(const struct diagnose_gather_options *opt, const ch
         ok = catalogue_view_scene(v, opt->suite, &scene, &variant, e);
         if (!ok)
             break;
-        bool there = find_image(results, path, v, image) || err_set(&why, "no image");
-        if (there && read_image(v, image, v->spp, &clue[*num], &why)) {
-            add_consistency(results, &clue[*num]);
+        bool there = find_image(results, path, v, subject, image) || err_set(&why, "no image");
+        if (there && read_image(v, image, is_ours ? v->spp : 0, is_ours, &clue[*num], &why)) {
+            if (is_ours)
+                add_consistency(results, &clue[*num]);
             ++*num;
         } else {
             json_array_append_new(skipped,

@@ -23,7 +23,8 @@ bool diagnose_gather_program(const struct diagnose_gather_options *opt, const ch
                              struct observation *clue, int *num, struct err *e)
     __attribute__((warn_unused_result));
 
-/* Of the images and claims of consistency of a results.json by `assay validate`. Views that it has no
+/* Of the images and claims of consistency of a results.json by `assay validate`; of one with --engine, that engine's
+ * images, of which only the means are held against bugs, as its noise may rightly be another. Views that it has no
  * image of, or of another shape, are left out and appended to `skipped` as {"view": , "reason": }. Fails
  * if none is left. */
 bool diagnose_gather_results(const struct diagnose_gather_options *opt, const char *path,

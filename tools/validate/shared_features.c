@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { MOST_KEPT = 16, MOST_TOLD = 3, MOST_NAMED = 6 };
+enum { MOST_KEPT = 16, MOST_TOLD = 3, MOST_NAMED = 6, FEW_SCENES = 6 };
 
 /* By how much another place to look may be less likely and still be told. */
 static const double tie = 20;
@@ -138,6 +138,14 @@ static void tell_place(const struct traits *t, uint64_t bits, struct text *to)
         append(to, "; %d of the %d that agree have, too.", agree, all);
 }
 
+static int num_scenes(const struct traits *t)
+{
+    int num = 0;
+    for (int i = 0; i < t->num_claims; i++)
+        num += i == 0 || strcmp(t->claim[i].scene, t->claim[i - 1].scene) != 0;
+    return num;
+}
+
 static void tell(const struct traits *t, struct text *to)
 {
     struct place best[MOST_KEPT];
@@ -147,6 +155,9 @@ static void tell(const struct traits *t, struct text *to)
                "Every claim differs, all %d: look at what all scenes need, such as the camera, the "
                "loader, the film.",
                t->num_claims);
+    else if (best[0].bits == 0 && num_scenes(t) < FEW_SCENES)
+        append(to, "%d claims differ and %d agree; what those have in common shows in more scenes.",
+               t->num_differ, t->num_claims - t->num_differ);
     else if (best[0].bits == 0)
         append(
             to,
