@@ -1,5 +1,5 @@
 /* The loader by the cases of geometry.cases, look.cases and light.cases, whose expected numbers were derived by hand beside
- * each case, and by documents that no file should hold. A case:
+ * each case, of refused.cases, and by documents that no file should hold. A case:
  *     = NAME            or "+ NAME", which keeps the pieces of the case before
  *     dialect cgl       or collada; without it the file's own
  *     asset, effect, mesh, libraries, nodes: the pieces of dae.h; a line that begins with a blank goes on
@@ -329,6 +329,10 @@ TEST(materials)
 TEST(lights_and_cameras)
 {
     run_file("tests/renderer/collada/light.cases", 35);
+}
+TEST(refused)
+{
+    run_file("tests/renderer/collada/refused.cases", 53);
 }
 
 TEST(microfacet_of_ours)

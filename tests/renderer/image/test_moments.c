@@ -212,3 +212,60 @@ TEST(failed_write_leaves_nothing)
     assert_true(strncmp(e.msg, "/nonexistent/m.exr", 18) == 0);
     moments_free(&m);
 }
+
+/* A copy holds all of it and shares nothing. */
+TEST(copies)
+{
+    struct err e = {0};
+    struct moments m, copy;
+    MUST(moments_alloc(&m, 3, 2, &e));
+    for (size_t p = 0; p < 6; p++)
+        for (uint32_t i = 0; i < 5 + p; i++)
+            moments_add(
+                &m, p,
+                (double[3]){observation(i, 0) + (double)p, observation(i, 1), observation(i, 2)});
+    strcpy(m.unit, "replicate");
+    m.spp = 9;
+    MUST(moments_copy(&m, &copy, &e));
+    assert_int_equal(copy.width, 3);
+    assert_int_equal(copy.height, 2);
+    assert_string_equal(copy.unit, "replicate");
+    assert_true(copy.spp == 9 && copy.tolerance == NULL);
+    const double n = m.n[5], last[3] = {m.mean[17], m.m2[17], m.m3[17]};
+    assert_true(n == 10 && last[0] > 0 && last[1] > 0 && last[2] != 0);
+    assert_memory_equal(copy.n, m.n, 6 * sizeof *m.n);
+    assert_memory_equal(copy.mean, m.mean, 18 * sizeof *m.mean);
+    assert_memory_equal(copy.m2, m.m2, 18 * sizeof *m.m2);
+    assert_memory_equal(copy.m3, m.m3, 18 * sizeof *m.m3);
+    moments_free(&m);
+    assert_true(copy.n[5] == n && copy.mean[17] == last[0] && copy.m2[17] == last[1] &&
+                copy.m3[17] == last[2]);
+    moments_free(&copy);
+}
+
+TEST(what_cannot_be_moments)
+{
+    struct err e = {0};
+    struct moments a, b;
+    REFUSES(moments_alloc(&a, 0, 1, &e), "0 x 1 pixels");
+    REFUSES(moments_alloc(&a, 1, 0, &e), "1 x 0 pixels");
+    REFUSES(moments_alloc(&a, -1, 1, &e), "-1 x 1 pixels");
+    for (int which = 0; which < 2; which++) {
+        MUST(moments_alloc(&a, 1, 1, &e));
+        MUST(moments_alloc(&b, 1, 1, &e));
+        double *rounded = calloc(3, sizeof *rounded);
+        (which == 0 ? &a : &b)->tolerance = rounded;
+        REFUSES(moments_merge(&a, &b, &e), "rounded numbers");
+        moments_free(&a);
+        moments_free(&b);
+    }
+    MUST(moments_alloc(&a, 2, 2, &e));
+    MUST(moments_alloc(&b, 1, 2, &e));
+    REFUSES(moments_merge(&a, &b, &e), "2 x 2 and 1 x 2");
+    moments_free(&b);
+    MUST(moments_alloc(&b, 2, 2, &e));
+    b.spp = 2;
+    REFUSES(moments_merge(&a, &b, &e), "of 1 spp and a sample of 2 spp");
+    moments_free(&a);
+    moments_free(&b);
+}

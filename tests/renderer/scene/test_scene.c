@@ -231,3 +231,110 @@ TEST(bad_scenes_are_refused)
         scene_free(&s);
     }
 }
+
+/* Every number of a scene at and beyond the ends of where it may be, one at a time. */
+enum part { MATERIAL, GLASS, ROUGH, POINT, SPOT, SUN, SPHERE, NUM_PARTS };
+
+static float *number_of(struct scene *s, enum part part, size_t offset)
+{
+    switch (part) {
+    case GLASS: s->materials[0].kind = MATERIAL_GLASS; break;
+    case ROUGH: s->materials[0].kind = MATERIAL_MICROFACET; break;
+    case SPOT: s->lights[0].kind = LIGHT_SPOT; break;
+    case SUN: s->lights[0].kind = LIGHT_DIRECTIONAL; break;
+    case MATERIAL:
+    case POINT:
+    case SPHERE:
+    case NUM_PARTS: break;
+    }
+    s->materials[0].ior = 1.5f;
+    s->materials[0].alpha = 0.5f;
+    s->lights[0].axis = s->lights[0].to_light = v3(0, 0, 1);
+    s->lights[0].cos_cutoff = 0.5f;
+    char *base = part == SPHERE ? (char *)&s->spheres[1]
+                 : part < POINT ? (char *)&s->materials[0]
+                                : (char *)&s->lights[0];
+    return (float *)(void *)(base + offset);
+}
+
+TEST(every_number_is_looked_at)
+{
+#define AT(type, member)   offsetof(struct type, member)
+#define EACH(type, member) AT(type, member), 3
+    const float inf = INFINITY, low = MICROFACET_MIN_ALPHA;
+    const struct {
+        enum part part;
+        size_t offset;
+        int count; /* numbers that follow each other */
+        float good[3], bad[4];
+        const char *says;
+    } of[] = {
+        {MATERIAL,
+         EACH(material, reflectance),
+         {0, 1, 0.5f},
+         {-1e-6f, 1.0001f, NAN, inf},
+         "reflectance"},
+        {GLASS,
+         EACH(material, transmittance),
+         {0, 1, 0.5f},
+         {-1e-6f, 1.0001f, NAN, inf},
+         "transmittance"},
+        {MATERIAL,
+         EACH(material, radiance),
+         {0, 1, 1e30f},
+         {-1e-6f, -1, NAN, inf},
+         "'paint': radiance"},
+        {ROUGH, EACH(material, eta), {0, 1, 1e9f}, {-1e-6f, -1, NAN, inf}, "index of refraction"},
+        {ROUGH, EACH(material, k), {0, 1, 1e9f}, {-1e-6f, -1, NAN, inf}, "index of refraction"},
+        {ROUGH, AT(material, alpha), 1, {low, 1, 1e9f}, {0.99f * low, -1, NAN, inf}, "roughness"},
+        {GLASS,
+         AT(material, ior),
+         1,
+         {1, 1 / MAX_IOR, MAX_IOR},
+         {0.99f / MAX_IOR, 1.01f * MAX_IOR, NAN, inf},
+         "index of refraction"},
+        {POINT, EACH(light, value), {0, 1, 1e30f}, {-1e-6f, -1, NAN, inf}, "light 0: value"},
+        {POINT, EACH(light, position), {0, -1, 1e30f}, {NAN, -NAN, inf, -inf}, "light 0: position"},
+        {SPOT, EACH(light, position), {0, -1, 1e30f}, {NAN, -NAN, inf, -inf}, "light 0: position"},
+        {POINT,
+         EACH(light, attenuation),
+         {2, 1, 1e30f},
+         {-1e-6f, -1, NAN, inf},
+         "light 0: attenuation"},
+        {SPOT, EACH(light, axis), {0, 0, 0}, {2, -2, NAN, inf}, "light 0: direction"},
+        {SUN, EACH(light, to_light), {0, 0, 0}, {2, -2, NAN, inf}, "light 0: direction"},
+        {SPOT, AT(light, cos_cutoff), 1, {0, 0.5f, 0.999f}, {-1e-6f, 1, NAN, inf}, "light 0: cone"},
+        {SPOT,
+         AT(light, exponent),
+         1,
+         {0, 1, 1e30f},
+         {-1e-6f, -1, NAN, inf},
+         "light 0: cone or exponent"},
+        {SPHERE, EACH(sphere, centre), {0, -1, 1e15f}, {NAN, -NAN, inf, -inf}, "sphere 1: centre"},
+        {SPHERE,
+         AT(sphere, radius),
+         1,
+         {1e-6f, 1, 1e9f},
+         {0, -1, NAN, inf},
+         "sphere 1: centre or radius"},
+        {SPHERE, AT(sphere, normal_out), 1, {1, -1, 1}, {0, 0.5f, -2, NAN}, "normal_out"},
+    };
+    for (size_t i = 0; i < COUNT(of); i++)
+        for (int k = 0; k < of[i].count; k++)
+            for (int v = 0; v < 7; v++) {
+                struct scene s = make_scene();
+                struct err e = {""};
+                float *x = number_of(&s, of[i].part, of[i].offset) + k;
+                bool is_direction = strstr(of[i].says, "direction") != NULL;
+                if (v < 3 && !is_direction) /* a direction is good as it is */
+                    *x = of[i].good[v];
+                else if (v >= 3)
+                    *x = of[i].bad[v - 3];
+                bool ok = scene_finish(&s, "room.dae", &e);
+                if (ok != (v < 3) || (!ok && strstr(e.msg, of[i].says) == NULL))
+                    fail_msg("%s, number %d, %g: '%s'", of[i].says, k, (double)*x, e.msg);
+                scene_free(&s);
+            }
+#undef EACH
+#undef AT
+}
