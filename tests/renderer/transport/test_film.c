@@ -488,6 +488,52 @@ TEST(layers_of_a_wall)
     drop(&f);
 }
 
+/* What a surface sends back of light that comes along its normal, whatever the direction seen from: of a metal
+ * ((eta-1)^2 + k^2)/((eta+1)^2 + k^2), of glass R = ((n-1)/(n+1))^2 of what it reflects and 1 - R of what it lets through. */
+TEST(albedo_layer_of_materials)
+{
+    static const struct {
+        struct material m;
+        double albedo[3];
+    } of[] = {{{.kind = MATERIAL_DIFFUSE, .reflectance = {0.1f, 0.2f, 0.3f}}, {0.1, 0.2, 0.3}},
+              {{.kind = MATERIAL_MIRROR, .reflectance = {0.1f, 0.2f, 0.3f}}, {0.1, 0.2, 0.3}},
+              {{.kind = MATERIAL_REFRACTION, .transmittance = {0.1f, 0.2f, 0.3f}, .ior = 1.5f},
+               {0.1, 0.2, 0.3}},
+              /* R = 1/25 */
+              {{.kind = MATERIAL_GLASS,
+                .reflectance = {1, 0.5f, 0},
+                .transmittance = {0.5f, 1, 0.25f},
+                .ior = 1.5f},
+               {0.04 + 0.48, 0.02 + 0.96, 0.24}},
+              /* (1 + 9)/(9 + 9), 0/(4 + 0), (0.25 + 1)/(6.25 + 1) */
+              {{.kind = MATERIAL_MICROFACET,
+                .conductor = true,
+                .eta = {2, 1, 1.5f},
+                .k = {3, 0, 1},
+                .alpha = 0.3f},
+               {10.0 / 18, 0, 1.25 / 7.25}}};
+    for (size_t i = 0; i < COUNT(of); i++) {
+        struct fixture f = {.scene = build_scene()};
+        uint32_t m = build_material(&f.scene, grey(0), grey(0));
+        f.scene.materials[m] = of[i].m;
+        build_quad(&f.scene, v3(-30, -30, -3), v3(60, 0, 0), v3(0, 60, 0), m);
+        build_camera(&f.scene, v3(0, 0, 0), 60);
+        finish(&f, SIZE, SIZE);
+        struct render_options o = options_of(2);
+        struct film film = start(&f, &o, NULL, true);
+        struct err e = {0};
+        struct image im;
+        MUST(film_layers(&film, &im, &e));
+        const float *albedo = im.data + image_channel(&im, "albedo.R");
+        for (size_t p = 0; p < SIZE * SIZE; p++)
+            for (size_t c = 0; c < 3; c++)
+                assert_near(albedo[NUM_LAYERS * p + c], of[i].albedo[c], 1e-6);
+        image_free(&im);
+        film_free(&film);
+        drop(&f);
+    }
+}
+
 /* cs184: s <= 1/2 blue to green, else green to red, linearly. */
 TEST(rate_colours)
 {
