@@ -534,6 +534,32 @@ TEST(albedo_layer_of_materials)
     }
 }
 
+/* Seen normals as colours, (n + 1)/2: of a triangle towards the camera, interpolated to (0.6, -0.48, 0.64); of a ball around
+ * the camera, inwards, -d; and black where nothing is. */
+TEST(normals_as_colours)
+{
+    for (int what = 0; what < 3; what++) {
+        struct fixture f = {.scene = build_scene()};
+        uint32_t m = build_material(&f.scene, grey(0.5f), grey(0));
+        build_quad(&f.scene, v3(-30, -30, what == 2 ? 3 : -3), v3(60, 0, 0), v3(0, 60, 0), m);
+        for (int k = 0; k < 6; k++)
+            f.scene.normal[k] = v3(0.6f, -0.48f, 0.64f);
+        if (what == 1)
+            build_sphere(&f.scene, v3(0, 0, 0), 1, -1, m);
+        build_camera(&f.scene, v3(0, 0, 0), 2);
+        finish(&f, SIZE, SIZE);
+        struct render_options o = options_of(1);
+        o.integrator.kind = INTEGRATE_NORMALS;
+        struct film film = start(&f, &o, NULL, false);
+        const double colour[3][3] = {{0.8, 0.26, 0.82}, {0.5, 0.5, 1}, {0, 0, 0}};
+        for (size_t p = 0; p < SIZE * SIZE; p++)
+            for (size_t c = 0; c < 3; c++) /* of the ball within an image of 2 degrees */
+                assert_near(film.m.mean[3 * p + c], colour[what][c], what == 1 ? 0.02 : 1e-6);
+        film_free(&film);
+        drop(&f);
+    }
+}
+
 /* cs184: s <= 1/2 blue to green, else green to red, linearly. */
 TEST(rate_colours)
 {
