@@ -1,6 +1,6 @@
 /* Memory of a run and all that it starts, bounded by the kernel: a control group of its own, which counts what no process has any more, too
- * [Linux, Documentation/admin-guide/cgroup-v2.rst; cgroup-v1/memory.rst]. Where none can be made there is none: that takes root
- * and a hierarchy in which groups may be made. */
+ * [Linux, Documentation/admin-guide/cgroup-v2.rst; cgroup-v1/memory.rst]. Where none can be made there is none: that takes root,
+ * or a hierarchy (of version 1) whose part that this process is in was given to its user. */
 #ifndef ASSAY_MEMORY_GROUP_H
 #define ASSAY_MEMORY_GROUP_H
 
