@@ -58,7 +58,7 @@ static void write_csv(FILE *f, const json_t *engines)
 
 static void write_rungs(FILE *f, const json_t *scene)
 {
-    fputs("<h4>The rungs</h4>\n", f);
+    fputs("<h3>The rungs</h3>\n", f);
     html_table_open(f, NULL, "Table of rungs",
                     "Engine|>Samples|>RMSE %|>Variance|>RMS bias %|>CPU s|>Efficiency 1/s");
     const json_t *engines = json_object_get(scene, "engines");
