@@ -167,8 +167,10 @@ void html_p_value(FILE *f, double log10_p)
 {
     if (log10_p > -4)
         fprintf(f, "%.3g", pow(10, log10_p));
-    else
+    else if (log10_p > -12)
         fprintf(f, "10<sup>%s</sup>", html_number(log10_p).s);
+    else
+        fputs("below 10<sup>−12</sup>", f);
 }
 
 void html_base64(FILE *f, const void *bytes, size_t size)

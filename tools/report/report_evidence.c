@@ -228,11 +228,11 @@ void report_evidence_tiles(FILE *f, const json_t *claim)
         for (size_t i = 0; i < num && i < SHOWN; i++) {
             const struct tile *k = &tile[i];
             fprintf(f,
-                    "<button type=\"button\" data-x=\"%.0f\" data-y=\"%.0f\">%.0f, %.0f: p %.2g, "
+                    "<button type=\"button\" data-x=\"%.0f\" data-y=\"%.0f\">%.0f, %.0f: p %s%.2g, "
                     "t %s</button>\n",
                     side * (double)(k->index % columns), side * (double)(k->index / columns),
                     side * (double)(k->index % columns), side * (double)(k->index / columns),
-                    pow(10, fmin(k->log10_p, 0)),
+                    k->log10_p < -12 ? "&lt; " : "", pow(10, fmin(fmax(k->log10_p, -12), 0)),
                     html_number(json_number_value(json_array_get(t, k->index))).s);
         }
         fputs(
