@@ -99,7 +99,10 @@ static bool render_ours(const struct reference_command *c, const struct suite_sc
                                   .seed = c->opt.seed,
                                   .timeout_s = c->opt.timeout_s,
                                   .deadline = INFINITY};
-    return noise_ladder_render(&job, l, e);
+    struct noise_renders r = {0};
+    bool ok = noise_ladder_render(&job, job.replicates, &r, l, e);
+    noise_ladder_renders_free(&r);
+    return ok;
 }
 
 /* Adds where it comes from; made: see the header. */

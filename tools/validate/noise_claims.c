@@ -32,7 +32,9 @@ struct row {
     int worst; /* tile of the claim */
     struct estimate slope;
     double slope_margin; /* 0: not judged */
+    bool both;           /* a claim of two sides */
     bool has_slope, has_stated, has_tiles;
+    bool tiles_inside; /* the estimates of all of them are within their margins */
     enum verdict slope_verdict;
 };
 
@@ -186,20 +188,39 @@ static json_t *bare_row(const struct suite_scene *s, const char *engine, const c
                      not_stored ? "not_stored" : "error", why);
 }
 
+/* Of a record's observations: what this look has, and what all looks would have, which says the margin. */
+struct shares {
+    double seen, all;
+};
+
+static struct shares shares_of(const struct noise_ladder *run, double of_record)
+{
+    return (struct shares){of_record, of_record * NOISE_REPLICATES / run->replicates};
+}
+
+static bool is_inside(const struct variance_claim *c, bool both)
+{
+    return c->verdict != VERDICT_DIFFERENT && c->ratio <= 1 + c->margin &&
+           (!both || c->ratio >= 1 / (1 + c->margin));
+}
+
 /* Every tile of which something can be said; keeps the one furthest out. A tile can be found to differ, no more: its few
  * pixels may know their own uncertainty too badly to say anything else. */
 static void judge_tiles(const struct noise_ladder *run, const struct variance_map *wanted,
-                        const struct variance_map *record, double share, bool both, double alpha,
-                        struct row *r)
+                        const struct variance_map *record, const struct shares *share, bool both,
+                        double alpha, struct row *r)
 {
     int num = run->sample.tiles_x * run->sample.tiles_y;
     double furthest = -INFINITY;
-    r->has_tiles = true;
+    r->has_tiles = r->tiles_inside = true;
     for (int i = 0; i < num; i++) {
-        double margin = variance_ladder_margin(record->tile[i], share, noise_ladder_least_margin);
-        struct estimate v = variance_ladder_expect(run->sample.tile[i], record->tile[i], share);
+        double margin =
+            variance_ladder_margin(record->tile[i], share->all, noise_ladder_least_margin);
+        struct estimate v =
+            variance_ladder_expect(run->sample.tile[i], record->tile[i], share->seen);
         struct variance_claim c =
             variance_ladder_judge(v, wanted->tile[i], margin, both, alpha / num);
+        r->tiles_inside = r->tiles_inside && is_inside(&c, both);
         double out = c.ratio / (1 + c.margin) + (c.verdict == VERDICT_DIFFERENT ? 1e9 : 0);
         if (out > furthest) {
             furthest = out;
@@ -232,24 +253,26 @@ static void judge_slope(const struct noise_ladder *run, const struct noise_ladde
                         struct row *r)
 {
     struct estimate was;
-    double share = (double)run->replicates / record->replicates;
+    struct shares share = shares_of(run, (double)run->replicates / record->replicates);
     r->has_slope = noise_ladder_slope(run, &r->slope);
     if (!r->has_slope || !noise_ladder_slope(record, &was))
         return;
-    double half = fmax(slope_margin, variance_ladder_reach(was, share));
+    double half = fmax(slope_margin, variance_ladder_reach(was, share.all));
     r->slope_margin = half <= most_slope ? half : 0;
-    r->slope = variance_ladder_expect(r->slope, was, share);
+    r->slope = variance_ladder_expect(r->slope, was, share.seen);
 }
 
 /* By the record, or by a closed form, where the record only says which margins can be had. */
 static void judge_independent(const struct noise_ladder *run, const struct variance_map *wanted,
                               const struct noise_ladder *record, bool both, struct row *r)
 {
-    double a = r->alpha, each = image_share / (both ? 2 : 1), share = run->n / record->n;
-    double margin = variance_ladder_margin(record->sample.image, share, noise_ladder_least_margin);
-    struct estimate v = variance_ladder_expect(run->sample.image, record->sample.image, share);
+    const struct shares share = shares_of(run, run->n / record->n);
+    double a = r->alpha, each = image_share / (both ? 2 : 1);
+    double margin =
+        variance_ladder_margin(record->sample.image, share.all, noise_ladder_least_margin);
+    struct estimate v = variance_ladder_expect(run->sample.image, record->sample.image, share.seen);
     r->image = variance_ladder_judge(v, wanted->image, margin, both, a * each);
-    judge_tiles(run, wanted, &record->sample, share, both, a * tile_share / (both ? 2 : 1), r);
+    judge_tiles(run, wanted, &record->sample, &share, both, a * tile_share / (both ? 2 : 1), r);
     if (noise_ladder_is_silent(run))
         return;
     judge_slope(run, record, r);
@@ -257,8 +280,8 @@ static void judge_independent(const struct noise_ladder *run, const struct varia
         r->slope_verdict =
             convergence_rate_slope_verdict(r->slope, a * other_share, r->slope_margin);
     struct estimate was = stated_error(record),
-                    is = variance_ladder_expect(stated_error(run), was, share);
-    margin = variance_ladder_margin(was, share, stated_margin);
+                    is = variance_ladder_expect(stated_error(run), was, share.seen);
+    margin = variance_ladder_margin(was, share.all, stated_margin);
     r->has_stated = true;
     r->stated = variance_ladder_judge(is, v, margin, true, a * other_share / 2);
 }
@@ -269,10 +292,11 @@ static void judge_sobol(const struct noise_ladder *run, const struct noise_ladde
 {
     struct estimate top = run->rung[run->num - 1].variance,
                     was = record->rung[record->num - 1].variance;
-    double a = r->alpha * other_share, share = (double)run->replicates / record->replicates;
-    top = variance_ladder_expect(top, was, share);
+    const struct shares share = shares_of(run, (double)run->replicates / record->replicates);
+    double a = r->alpha * other_share;
+    top = variance_ladder_expect(top, was, share.seen);
     r->image = variance_ladder_judge(
-        top, was, variance_ladder_margin(was, share, noise_ladder_least_margin), false, a);
+        top, was, variance_ladder_margin(was, share.all, noise_ladder_least_margin), false, a);
     judge_slope(run, record, r);
     if (r->slope_margin <= 0)
         return;
@@ -319,37 +343,76 @@ static bool closed_form(const struct suite_scene *s, const struct converge_refer
 
 static const char *const ours[2] = {"pathtracer", "pathtracer-sobol"};
 
-/* Renders with one sampler and judges it by its record. */
-static bool judge_ours(const struct noise_job *job, const json_t *stored, double alpha,
-                       json_t *rows, struct err *e)
+/* Whether all replicates would say nothing else: something differs, or what can be shown to be the same is shown, and the rest,
+ * which can only be found to differ, has its estimate inside its margin. What all would find lies z > 4.8 of their standard
+ * errors beyond it, so that of half of them it is inside with a chance of Phi(-z/sqrt 2) < 4e-4. */
+static bool is_decided(const struct row *r)
+{
+    char reason[256];
+    bool same = r->image.verdict == VERDICT_EQUIVALENT ||
+                (r->image.verdict == VERDICT_NOTHING_FOUND && is_inside(&r->image, r->both));
+    return overall(r, reason) == VERDICT_DIFFERENT ||
+           (same && (!r->has_tiles || r->tiles_inside) &&
+            (!r->has_stated || r->stated.verdict != VERDICT_INCONCLUSIVE) &&
+            (r->slope_margin <= 0 || r->slope_verdict == VERDICT_EQUIVALENT));
+}
+
+/* One look with one sampler, at so many replicates; *row is what it says. */
+static bool look(const struct noise_job *job, int replicates, struct noise_renders *renders,
+                 const struct noise_ladder *record, double alpha, bool *decided, json_t **row,
+                 struct err *e)
 {
     struct row r = {.scene = job->scene, .engine = ours[job->sobol], .alpha = alpha, .timed = true};
-    struct noise_ladder run = {0}, record = {0};
+    struct noise_ladder run = {0};
     struct variance_map form = {0};
-    bool has_form = false;
-    const json_t *entry = json_object_get(stored, r.engine);
-    bool ok =
-        entry != NULL || err_set(e, "no record of its noise is stored: `make golden` makes it");
-    ok = ok && noise_ladder_parse(entry, job->scene, &record, e) &&
-         noise_ladder_render(job, &run, e);
-    if (ok && (run.sample.tiles_x != record.sample.tiles_x ||
-               run.sample.tiles_y != record.sample.tiles_y))
+    bool has_form = false, ok = noise_ladder_render(job, replicates, renders, &run, e);
+    if (ok && (run.sample.tiles_x != record->sample.tiles_x ||
+               run.sample.tiles_y != record->sample.tiles_y))
         ok = err_set(e, "damaged: its tiles are not those of the scene");
     ok = ok && (job->sobol || closed_form(job->scene, job->unit, &run.sample, &form, &has_form, e));
     if (ok) {
         r.ladder = &run;
         r.what = job->sobol ? "the variance of the last rung" : "the variance of a sample";
         r.against = has_form ? "closed form" : "record";
+        r.both = has_form;
         if (job->sobol)
-            judge_sobol(&run, &record, &r);
+            judge_sobol(&run, record, &r);
         else
-            judge_independent(&run, has_form ? &form : &record.sample, &record, has_form, &r);
-        ok = json_array_append_new(rows, judged_row(&r)) == 0 || err_set(e, "out of memory");
+            judge_independent(&run, has_form ? &form : &record->sample, record, has_form, &r);
+        *decided = is_decided(&r);
+        *row = judged_row(&r);
+        ok = *row != NULL || err_set(e, "out of memory");
     }
     noise_ladder_free(&run);
-    noise_ladder_free(&record);
     variance_map_free(&form);
-    return ok || err_prefix(e, "%s", r.engine);
+    return ok;
+}
+
+/* Renders with one sampler and judges it by its record. With a budget in two looks, at half of the replicates and at all of
+ * them, each at half of alpha. */
+static bool judge_ours(const struct noise_job *job, const json_t *stored, double alpha, int looks,
+                       json_t *rows, struct err *e)
+{
+    const char *engine = ours[job->sobol];
+    const json_t *entry = json_object_get(stored, engine);
+    struct noise_ladder record = {0};
+    struct noise_renders renders = {0};
+    json_t *row = NULL;
+    bool ok =
+        entry != NULL || err_set(e, "no record of its noise is stored: `make golden` makes it");
+    ok = ok && noise_ladder_parse(entry, job->scene, &record, e);
+    bool decided = false;
+    for (int k = 1; ok && !decided && k <= looks; k++) {
+        json_decref(row);
+        row = NULL;
+        ok = look(job, job->replicates * k / looks, &renders, &record, alpha / looks, &decided,
+                  &row, e);
+    }
+    ok = ok && (json_array_append(rows, row) == 0 || err_set(e, "out of memory"));
+    json_decref(row);
+    noise_ladder_renders_free(&renders);
+    noise_ladder_free(&record);
+    return ok || err_prefix(e, "%s", engine);
 }
 
 /* What is stored of another engine: measured, and judged by nothing. Its time counts where that of ours was taken in the
@@ -408,7 +471,7 @@ json_t *noise_claims_run(const struct validate_options *opt, const struct suite_
               noise_ladder_unit(opt->golden_dir, s, 1, &unit, &e);
     for (int sampler = 0; ok && sampler < 2; sampler++) {
         job.sobol = sampler == 1;
-        ok = judge_ours(&job, stored, alpha, rows, &e);
+        ok = judge_ours(&job, stored, alpha, opt->budget_s > 0 ? 2 : 1, rows, &e);
     }
     if (!ok) {
         json_array_clear(rows);

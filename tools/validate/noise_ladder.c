@@ -82,43 +82,65 @@ static bool render_one(const struct noise_job *job, int rung, int k, struct mome
     return true;
 }
 
-/* One rung of ours, of which the last also tells the variance of a sample. */
-static bool climb(const struct noise_job *job, int rung, float *images, struct moments *render,
-                  struct noise_ladder *l, struct err *e)
+void noise_ladder_renders_free(struct noise_renders *r)
 {
-    size_t size = job->unit->size;
-    int done = 0;
-    double total = 0, cpu_s;
-    bool ok = true;
-    for (; ok && done < job->replicates; done += ok) {
-        ok = render_one(job, rung, done, &render[done], &cpu_s, e);
-        for (size_t i = 0; ok && i < size; i++)
-            images[(size_t)done * size + i] = (float)render[done].mean[i];
-        total += ok ? cpu_s : 0;
-    }
-    ok = ok && noise_ladder_add(l, images, noise_ladder_spp[rung], total / job->replicates,
-                                job->unit, job->scene->width, job->scene->tile, e);
-    if (ok && !job->sobol && rung == NOISE_RUNGS - 1) {
-        variance_map_free(&l->sample);
-        l->n = (double)job->replicates * NOISE_TOP;
-        ok = variance_ladder_within(render, job->replicates, job->unit, job->scene->tile,
-                                    &l->sample, e);
-    }
-    for (int k = 0; k < done; k++)
-        moments_free(&render[k]);
-    return ok;
+    for (int i = 0; i < NOISE_RUNGS; i++)
+        free(r->images[i]);
+    for (int k = 0; r->last != NULL && k < r->done; k++)
+        moments_free(&r->last[k]);
+    free(r->last);
+    *r = (struct noise_renders){0};
 }
 
-bool noise_ladder_render(const struct noise_job *job, struct noise_ladder *out, struct err *e)
+static bool begin(const struct noise_job *job, struct noise_renders *r, struct err *e)
 {
-    *out = (struct noise_ladder){.replicates = job->replicates};
-    float *images = malloc((size_t)job->replicates * job->unit->size * sizeof *images);
-    struct moments *render = calloc((size_t)job->replicates, sizeof *render);
-    bool ok = (images != NULL && render != NULL) || err_set(e, "out of memory");
-    for (int rung = 0; ok && rung < NOISE_RUNGS; rung++)
-        ok = climb(job, rung, images, render, out, e);
-    free(images);
-    free(render);
+    bool ok = true;
+    for (int i = 0; i < NOISE_RUNGS && r->images[i] == NULL; i++) {
+        r->images[i] = malloc((size_t)job->replicates * job->unit->size * sizeof *r->images[i]);
+        ok = ok && r->images[i] != NULL;
+    }
+    if (!job->sobol && r->last == NULL)
+        r->last = calloc((size_t)job->replicates, sizeof *r->last);
+    return (ok && (job->sobol || r->last != NULL)) || err_set(e, "out of memory");
+}
+
+/* Replicate k of every rung. */
+static bool climb(const struct noise_job *job, int k, struct noise_renders *r, struct err *e)
+{
+    const size_t size = job->unit->size;
+    for (int rung = 0; rung < NOISE_RUNGS; rung++) {
+        struct moments m;
+        double cpu_s;
+        if (!render_one(job, rung, k, &m, &cpu_s, e))
+            return false;
+        for (size_t i = 0; i < size; i++)
+            r->images[rung][(size_t)k * size + i] = (float)m.mean[i];
+        r->cpu_s[rung] += cpu_s;
+        if (rung == NOISE_RUNGS - 1 && !job->sobol)
+            r->last[k] = m;
+        else
+            moments_free(&m);
+    }
+    r->done = k + 1;
+    return true;
+}
+
+bool noise_ladder_render(const struct noise_job *job, int count, struct noise_renders *r,
+                         struct noise_ladder *out, struct err *e)
+{
+    const int width = job->scene->width, tile = job->scene->tile;
+    *out = (struct noise_ladder){.replicates = count};
+    bool ok = begin(job, r, e);
+    while (ok && r->done < count)
+        ok = climb(job, r->done, r, e);
+    for (int i = 0; ok && i < NOISE_RUNGS; i++)
+        ok = noise_ladder_add(out, r->images[i], noise_ladder_spp[i], r->cpu_s[i] / count,
+                              job->unit, width, tile, e);
+    if (ok && !job->sobol) { /* the last rung also tells the variance of a sample */
+        variance_map_free(&out->sample);
+        out->n = (double)count * NOISE_TOP;
+        ok = variance_ladder_within(r->last, count, job->unit, tile, &out->sample, e);
+    }
     if (!ok)
         noise_ladder_free(out);
     return ok;

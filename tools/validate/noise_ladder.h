@@ -52,11 +52,21 @@ struct noise_job {
     const struct converge_reference *unit;
     const char *pathtracer, *dir; /* dir: of temporary files, exists */
     bool sobol;
-    int replicates, threads;
-    uint32_t seed, first; /* the seeds are replicate_seed(seed, first ...) */
+    int replicates, threads; /* replicates: all that there may be */
+    uint32_t seed, first;    /* the seeds are replicate_seed(seed, first ...) */
     double timeout_s, deadline;
 };
-bool noise_ladder_render(const struct noise_job *job, struct noise_ladder *out, struct err *e)
+/* What a ladder is made of, which may grow. */
+struct noise_renders {
+    int done;                   /* replicates */
+    float *images[NOISE_RUNGS]; /* room for all of the job's */
+    struct moments *last;       /* those of the last rung of independent samples */
+    double cpu_s[NOISE_RUNGS];
+};
+void noise_ladder_renders_free(struct noise_renders *r);
+/* Renders up to `count` replicates of each rung, those of *r among them (all zero at first); *out: the ladder of them. */
+bool noise_ladder_render(const struct noise_job *job, int count, struct noise_renders *r,
+                         struct noise_ladder *out, struct err *e)
     __attribute__((warn_unused_result));
 /* One more rung from images of any engine; the first one is also its `sample`. */
 bool noise_ladder_add(struct noise_ladder *l, const float *images, int spp, double cpu_s,
