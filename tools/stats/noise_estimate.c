@@ -232,6 +232,11 @@ static bool coarse(const struct grid *d, const struct blocks *g, int side, doubl
     return ok;
 }
 
+static bool tell_too_few(struct err *e)
+{
+    return err_set(e, "too few pixels vary or are not saturated to tell their noise");
+}
+
 /* How much more variance means of squares have than if pixels were independent, and an upper bound of that of ever larger
  * squares: by chi-square with the degrees of freedom that the sums of squares leave, and by as much again as from half
  * the side, as it nears its limit like 1/side, or more where it rises steeply. The side is 4, or larger while it does. */
@@ -250,7 +255,7 @@ static bool level(const struct grid *d, const struct blocks *blocks, double *fac
         g = grid_sums(&twos);
         h = grid_sums(&fours);
         if (f.s2 > 0 && h.num < FEWEST)
-            ok = err_set(e, "too few pixels vary or are not saturated to tell their noise");
+            ok = tell_too_few(e);
     }
     if (ok && f.s2 > 0 && h.s2 > 0) {
         double dof = 2 / (tail_factor * (f.s4 / (f.s2 * f.s2) + h.s4 / (h.s2 * h.s2)));
@@ -259,7 +264,7 @@ static bool level(const struct grid *d, const struct blocks *blocks, double *fac
         bool shared = *factor > rising * half;
         double next, more;
         if (shared)
-            ok = coarse(d, blocks, 4, factor, &dof, e);
+            ok = coarse(d, blocks, 4, factor, &dof, e) && (dof > 0 || tell_too_few(e));
         for (int side = 2 * 4; ok && shared; side *= 2) {
             ok = coarse(d, blocks, side, &next, &more, e);
             if (more == 0)
@@ -270,8 +275,9 @@ static bool level(const struct grid *d, const struct blocks *blocks, double *fac
             shared = *factor > steep * half;
         }
         double q = fmin(*factor / half, unbounded);
-        *bound = *factor * dof / gsl_cdf_chisq_Pinv(level_error, dof) +
-                 fmax(0, *factor - half) * fmax(1, q / (4 - q));
+        if (ok)
+            *bound = *factor * dof / gsl_cdf_chisq_Pinv(level_error, dof) +
+                     fmax(0, *factor - half) * fmax(1, q / (4 - q));
     }
     free(fine.v);
     free(twos.v);

@@ -189,6 +189,38 @@ static int count_different(enum noise kind, double scale, double alpha, int runs
 
 /* H0: the same mean. alpha 5 %, 400 pairs a law: more than 36 (9 %) would have a chance of 1e-4 at a
  * true rate of 5 %. Negative control: without the factor for what neighbours share, it is exceeded. */
+/* Images that are the same but in a square, as of a program without seeds that has changed in one thing: whatever the
+ * square's size, there is a finite variance or a line. */
+TEST(test_same_but_in_a_square)
+{
+    const int width = 96, height = 64, at = 12; /* within a block */
+    int refused = 0;
+    for (int side = 1; side <= height - at; side++) {
+        struct moments a = new_moments(width, height, "sample"),
+                       b = new_moments(width, height, "sample");
+        uint64_t seed = (uint64_t)side, other = 1000 + (uint64_t)side;
+        struct noise_estimate s;
+        struct err e;
+        paint(&a, SMOOTHED, 1, &seed);
+        paint(&b, SMOOTHED, 1, &other);
+        for (int p = 0; p < width * height; p++)
+            for (int c = 0; c < 3 && !(p % width >= at && p / width >= at &&
+                                       p % width < at + side && p / width < at + side);
+                 c++)
+                b.mean[3 * p + c] = a.mean[3 * p + c];
+        if (noise_estimate_variance(&a, &b, NULL, NULL, NULL, &s, &e)) {
+            struct cell all = image_cell(&a, &b);
+            assert_true(isfinite(all.va) && isfinite(all.vb) && all.va > 0);
+        } else {
+            assert_non_null(strstr(e.msg, "too few pixels"));
+            refused++;
+        }
+        moments_free(&a);
+        moments_free(&b);
+    }
+    assert_true(refused > 0 && refused < height - at);
+}
+
 TEST(test_false_alarms)
 {
     int most = 36;
