@@ -13,7 +13,7 @@
 #include <string.h>
 
 static const char *const format_names[] = {ENGINES(ENGINE_WORD) "dae", "file", NULL};
-static const char *const output_names[] = {"mean", "exact", "moments", NULL};
+static const char *const output_names[] = {"mean", "exact", "moments", "noisy", NULL};
 static const char *const image_names[] = {"exr", "hdr", "pfm", NULL};
 
 /* What a placeholder may be called in each of the arrays. */
@@ -112,10 +112,11 @@ static bool read_command(const struct json_node *n, const struct engine *en, str
     if (en->output == OUTPUT_MEAN && !seed)
         return err_set(e,
                        "%s: 'command' has no {seed}, so no two images would be independent; an "
-                       "image without noise has \"output\": \"exact\"",
+                       "image without noise has \"output\": \"exact\", one noisy image \"noisy\"",
                        n->file);
-    if (en->output == OUTPUT_EXACT && seed)
-        return err_set(e, "%s: 'command' has a {seed}, but 'output' is 'exact'", n->file);
+    if ((en->output == OUTPUT_EXACT || en->output == OUTPUT_NOISY) && seed)
+        return err_set(e, "%s: 'command' has a {seed}, but 'output' is '%s'", n->file,
+                       output_names[en->output]);
     return true;
 }
 

@@ -6,7 +6,7 @@
 #include "renderer/image/moments.h"
 #include "reference/suite/suite.h"
 
-enum engine_output { OUTPUT_MEAN, OUTPUT_EXACT, OUTPUT_MOMENTS };
+enum engine_output { OUTPUT_MEAN, OUTPUT_EXACT, OUTPUT_MOMENTS, OUTPUT_NOISY };
 
 struct engine {
     char file[4096]; /* the description */
@@ -48,7 +48,7 @@ bool engine_argv(const struct engine *en, const char *key, const char *const *va
 bool engine_expresses(const struct engine *en, const struct suite_scene *scene, const char *dir,
                       struct err *why) __attribute__((warn_unused_result));
 
-/* Renders. *out (unit "replicate", "exact" or "sample") and *manifest (a new reference) belong to the
+/* Renders. *out (unit "replicate", "exact", "sample" or, of one noisy image, of whose noise nothing is known, "picture") and *manifest (a new reference) belong to the
  * caller; the manifest's members are those of reference_render.h, with "description_sha256" and "files" (the
  * hash of each file of {here} that the command names). "mean": K runs with seeds of their own, folded.
  * Fails, with the program's own last lines, when it is not there, dies, hangs or writes no image, an

@@ -99,7 +99,8 @@ static bool hash_files(const struct engine *en, json_t *files, struct err *e)
 static json_t *seeds_of(const struct engine_job *j)
 {
     json_t *seeds = json_array();
-    for (int k = 0; j->en->output != OUTPUT_EXACT && k < j->replicates; k++)
+    const bool has_seeds = j->en->output == OUTPUT_MEAN || j->en->output == OUTPUT_MOMENTS;
+    for (int k = 0; has_seeds && k < j->replicates; k++)
         json_array_append_new(seeds, json_integer(replicate_seed(j->opt->seed, k)));
     return seeds;
 }

@@ -139,12 +139,13 @@ static float *read_image(struct engine_job *j, const char *path, struct err *e)
     return out;
 }
 
-static void make_exact(struct moments *m)
+/* n: 1 of an exact image; of a noisy one 3, as noise_estimate.h has it, which is no count of anything. */
+static void make_single(struct moments *m, const char *unit, double n)
 {
-    strcpy(m->unit, "exact");
+    strcpy(m->unit, unit);
     m->spp = 0;
     for (size_t p = 0; p < (size_t)m->width * (size_t)m->height; p++)
-        m->n[p] = 1;
+        m->n[p] = n;
 }
 
 /* Runs, reads and folds. */
@@ -175,8 +176,10 @@ static bool fold_runs(struct engine_job *j, struct moments *m, struct err *e)
         free(px);
         unlink(path.s);
     }
-    if (ok && (j->en->output == OUTPUT_EXACT || repeats.without_noise))
-        make_exact(m);
+    if (ok && j->en->output == OUTPUT_NOISY)
+        make_single(m, "picture", 3);
+    else if (ok && (j->en->output == OUTPUT_EXACT || repeats.without_noise))
+        make_single(m, "exact", 1);
     else if (ok && check)
         ok = independence_check(&seen, j->independence, e);
     replicates_free(&seen);

@@ -223,7 +223,8 @@ static bool check_moments(const struct moments *m, const json_t *entry, const ch
                        m->height, (long long)width, (long long)height);
     if (!check_string(entry, "unit", m->unit, exr, "its unit is not that of its manifest", e))
         return false;
-    if (strcmp(m->unit, "sample") == 0) /* as many as the engine saw fit, for each pixel */
+    /* As many as the engine saw fit, for each pixel; or no count of anything. */
+    if (strcmp(m->unit, "sample") == 0 || strcmp(m->unit, "picture") == 0)
         return true;
     double n =
         strcmp(m->unit, "exact") == 0 ? 1 : json_number_value(json_object_get(entry, "replicates"));

@@ -7,6 +7,7 @@
 #include "tools/results/claim_result.h"
 #include "tools/results/noise_results.h"
 #include "tools/results/stated_error_results.h"
+#include "tools/stats/noise_estimate.h"
 #include "tools/results/results.h"
 
 #include <assert.h>
@@ -253,7 +254,44 @@ struct pair {
     struct claim_run *t;
     bool no_time;
     struct side_image *image[2]; /* of the last stage */
+    /* Of it, where one side is an image of whose noise nothing is known: copies, with the noise of A - B. */
+    bool is_estimated;
+    struct moments estimated[2];
 };
+
+static void pair_free(struct pair *p)
+{
+    moments_free(&p->estimated[0]);
+    moments_free(&p->estimated[1]);
+}
+
+static bool has_no_noise(const struct moments *m)
+{
+    return strcmp(m->unit, "picture") == 0;
+}
+
+/* The same bits, as of a program without seeds that has not changed, have no noise in A - B. */
+static bool estimate(struct pair *p, struct err *e)
+{
+    struct noise_estimate found;
+    struct moments *m = p->estimated;
+    pair_free(p);
+    for (int k = 0; k < 2; k++)
+        if (!moments_alloc(&m[k], p->image[k]->m.width, p->image[k]->m.height, e))
+            return false;
+    p->is_estimated = true;
+    size_t values = 3 * (size_t)m[0].width * (size_t)m[0].height;
+    for (int k = 0; k < 2; k++)
+        memcpy(m[k].mean, p->image[k]->m.mean, values * sizeof *m[k].mean);
+    if (memcmp(m[0].mean, m[1].mean, values * sizeof *m[0].mean) != 0)
+        return noise_estimate_variance(&m[0], &m[1], NULL, NULL, NULL, &found, e);
+    for (int k = 0; k < 2; k++) {
+        strcpy(m[k].unit, "exact");
+        for (size_t i = 0; i < values / 3; i++)
+            m[k].n[i] = 1;
+    }
+    return true;
+}
 
 static bool one_of(struct pair *p, struct side *s, int stage, struct side_image **image,
                    struct err *e)
@@ -274,6 +312,12 @@ static bool both_of(void *ctx, int stage, const struct moments **a, const struct
         return false;
     *a = &p->image[0]->m;
     *b = &p->image[1]->m;
+    if (!has_no_noise(*a) && !has_no_noise(*b))
+        return true;
+    if (!estimate(p, e))
+        return false;
+    *a = &p->estimated[0];
+    *b = &p->estimated[1];
     return true;
 }
 
@@ -305,10 +349,12 @@ static void look(struct validation *v, struct claim_run *t)
     int stage;
     double before_a = t->a->cpu_s, before_b = t->b->cpu_s;
     bool ok = alpha_spending_judge(t->looks, t->next, t->stages, &opt, both_of, &p, &c, &stage, &e);
-    if (ok && !hint_add(&p.image[0]->m, &p.image[1]->m, &c, &e)) {
+    if (ok && !hint_add(p.is_estimated ? &p.estimated[0] : &p.image[0]->m,
+                        p.is_estimated ? &p.estimated[1] : &p.image[1]->m, &c, &e)) {
         comparison_free(&c);
         ok = false;
     }
+    pair_free(&p);
     t->cpu_a += t->a->cpu_s - before_a;
     t->cpu_b += t->b->cpu_s - before_b;
     if (!ok && p.no_time) {

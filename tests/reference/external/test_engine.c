@@ -144,6 +144,8 @@ TEST(bad_descriptions_are_refused)
         {"format", "\"obj\"", "mitsuba, pbrt, dae"},
         {"output", "\"variance\"", "none of: mean, exact, moments"},
         {"output", "\"exact\"", "has a {seed}, but 'output' is 'exact'"},
+        {"output", "\"noisy\"", "has a {seed}, but 'output' is 'noisy'"},
+        {"format", "\"file\"", "'expresses' is for scenes that are looked into"},
         {"image", "\"png\"", "none of: exr, hdr, pfm"},
         {"command", "[]", "'command' is not a list of 1 to 256 texts"},
         {"command", "\"x {scene}\"", "'command' is not a list"},
@@ -431,6 +433,18 @@ TEST(images_without_noise_are_exact)
     MUST(render(&en, &point_plane, &m, &manifest, &e));
     assert_string_equal(m.unit, "exact");
     assert_true(m.n[11] == 1 && m.mean[3 * 11] == 12 && m.m2[3 * 11] == 0);
+    assert_int_equal(json_array_size(json_object_get(manifest, "seeds")), 0);
+    json_decref(manifest);
+    moments_free(&m);
+    engine_free(&en);
+    /* "noisy": one run, too, and nothing is known of its noise. */
+    must_load("{\"name\": \"x\", \"format\": \"file\", \"output\": \"noisy\", \"image\": \"pfm\", "
+              "\"command\": [\"sh\", \"-c\", \"cp {here}/ramp.pfm {out} # {scene} {name}\"]}",
+              &en);
+    assert_true(engine_expresses(&en, &point_plane, test_path("."), &e));
+    MUST(render(&en, &point_plane, &m, &manifest, &e));
+    assert_string_equal(m.unit, "picture");
+    assert_true(m.n[11] == 3 && m.mean[3 * 11] == 12 && m.m2[3 * 11] == 0);
     assert_int_equal(json_array_size(json_object_get(manifest, "seeds")), 0);
     json_decref(manifest);
     moments_free(&m);
