@@ -88,7 +88,7 @@ def main():
                 f"All pairs of {', '.join(RUN_FACTORS)}, that can be (adaptive sampling needs independent samples, shares",
                 f"that stopped by themselves do not add up, and to a pilot no samples can be added), over scenes by turns, with their samples ({SEEDS} images of seeds of their own with Sobol's), against the same references. Shares are of three ranges of sample",
                 "numbers, cells four rectangles of odd sizes (`-p`); both are merged. A PNG has to show the means of the EXR beside it,",
-                f"within rounding. Measured {ran['date']}.", "",
+                "within rounding. The last run is one more: each of its light samples has to choose among many lamps.", f"Measured {ran['date']}.", "",
                 "| run | scene | " + " | ".join(RUN_FACTORS) + " | verdict | difference % |", "|---|---|" + "---|" * len(RUN_FACTORS) + "---|--:|"]
         for run in ran["runs"]:
             out.append(f"| {run['name'][4:]} | {run['scene']} | " + " | ".join(str(run[f]) for f in RUN_FACTORS) +
