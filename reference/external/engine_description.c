@@ -173,6 +173,18 @@ static bool read_optional_int(const struct json_node *n, const char *key, int lo
     return json_object_get(n->object, key) == NULL || json_get_int(n, key, lo, hi, out, e);
 }
 
+static bool read_margin(const struct json_node *n, struct engine *en, struct err *e)
+{
+    static const char *const keys[] = {"global", "tile", "reason", NULL};
+    struct json_node m = {n->file, "margin.", NULL};
+    if (json_object_get(n->object, "margin") == NULL)
+        return true;
+    return json_get_object(n, "margin", &m.object, e) && json_only_keys(&m, keys, e) &&
+           json_get_number(&m, "global", 0, 1, &en->margin_global, e) &&
+           json_get_number(&m, "tile", 0, 1, &en->margin_tile, e) &&
+           json_get_text(&m, "reason", en->margin_reason, sizeof en->margin_reason, e);
+}
+
 static bool read_name(const struct json_node *n, struct engine *en, struct err *e)
 {
     static const char *const taken[] = {"truth", "pathtracer",
@@ -193,7 +205,7 @@ static bool read_engine(const char *path, struct engine *en, struct err *e)
     static const char *const keys[] = {
         "name",       "comment",   "format",           "command", "output",
         "image",      "expresses", "depth_offset",     "spp",     "version",
-        "replicates", "lens_args", "environment_args", NULL};
+        "replicates", "lens_args", "environment_args", "margin",  NULL};
     struct json_node n = {path, "", en->json};
     int word, image = 0;
     unsigned used;
@@ -218,7 +230,7 @@ static bool read_engine(const char *path, struct engine *en, struct err *e)
         return false;
     return read_features(&n, en, e) && read_command(&n, en, e) &&
            read_optional_int(&n, "depth_offset", -1, 1, &en->depth_offset, e) &&
-           read_optional_int(&n, "spp", 1, 1 << 24, &en->spp, e) &&
+           read_margin(&n, en, e) && read_optional_int(&n, "spp", 1, 1 << 24, &en->spp, e) &&
            read_optional_int(&n, "replicates", 3, 4096, &en->replicates, e) &&
            read_extra(&n, en, "lens_args", in_lens, FEATURE_LENS, e) &&
            read_extra(&n, en, "environment_args", in_environment, FEATURE_ENVIRONMENT, e);

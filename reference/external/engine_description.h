@@ -18,6 +18,9 @@ struct engine {
     char image[8];    /* "exr" */
     unsigned feature; /* bits, features.h */
     int depth_offset, spp, replicates;
+    /* How far it may be off in every scene that is to be EQUIVALENT, whatever that scene's margins are, and why; 0: no more. */
+    double margin_global, margin_tile;
+    char margin_reason[512];
     json_t *json; /* owned; arrays of texts that were checked */
 };
 

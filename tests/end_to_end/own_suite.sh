@@ -92,6 +92,14 @@ sed -i 's/"exr"/"pfm"/; s/64/16/' blurred/mine.json
 tell "replicates whose pixels share noise make no reference" "$(env -C blurred assay golden render --engine mine.json 2>&1 | grep -q 'cornell, mine: pixels share their noise' ||
     echo "no such line")"
 
+# A margin of the engine's own, with its reason: a difference of 2.5 %, beyond the suite's margin of 1 %, is within it, and the page says so.
+cp -r begun wide
+sed -i 's/"spp": 32/"margin": {"global": 0.3, "tile": 0.9, "reason": "its paths are <short>"}, "spp": 32/' wide/mine.json
+sed -i 's/-m "$5"/-m 3/' wide/mine.sh
+expect "an engine's own margin widens those of the scenes" 0 "^mine declares margins of its own, 30 % of an image and 90 % of a tile: its paths are <short>" \
+    env -C wide assay validate -q
+tell "the page says so" "$(grep -q 'mine declares margins of its own, 30 % of an image and 90 % of a tile.*: its paths are &lt;short&gt;' wide/build/report/index.html || echo "it does not")"
+
 # One long render of a program without seeds: of its own former release it has the same bits; a bug in it (16 % too dark) is found by the
 # noise of the difference. H0: the images are the same; alpha 1e-3 for the run, fixed seeds.
 cp -r begun quiet

@@ -111,6 +111,14 @@ static void write_verdict(FILE *f, const json_t *root, const struct claim_ref *c
                    member_text(claim->json, "reason"));
     if (bad > 0)
         write_claim_list(f, json_object_get(root, "claims"), claim, bad);
+    const json_t *margin = json_object_get(root, "engine_margin");
+    if (margin != NULL)
+        html_print(
+            f,
+            "<p class=\"lede\">%s declares margins of its own, %g %% of an image and %g %% of a tile, which widen those of "
+            "all scenes: %s</p>\n",
+            member_or_empty(margin, "engine"), 100 * member_number(margin, "global"),
+            100 * member_number(margin, "tile"), member_or_empty(margin, "reason"));
     const char *located = member_text(root, "located");
     if (located != NULL)
         html_print(f, "<p class=\"lede\">%s</p>\n", located);

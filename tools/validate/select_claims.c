@@ -140,14 +140,14 @@ static void init_sides(struct validation *v)
                                             .variant = &s->variant[k]};
         for (int k = 0; k < s->num_references; k++) {
             const struct suite_reference *ref = &s->reference[k];
-            own->reference[k] = (struct side){.kind = strcmp(ref->engine, "truth") == 0 ? SIDE_TRUTH
-                                                      : strcmp(ref->engine, "pathtracer") == 0
-                                                          ? SIDE_OURS
-                                                      : v->opt->live ? SIDE_LIVE
-                                                                     : SIDE_GOLDEN,
-                                              .name = ref->engine,
-                                              .scene = s,
-                                              .ref = ref};
+            own->reference[k] =
+                (struct side){.kind = strcmp(ref->engine, "truth") == 0        ? SIDE_TRUTH
+                                      : strcmp(ref->engine, "pathtracer") == 0 ? SIDE_OURS
+                                      : v->opt->live                           ? SIDE_LIVE
+                                                                               : SIDE_GOLDEN,
+                              .name = ref->engine,
+                              .scene = s,
+                              .ref = ref};
         }
     }
 }
@@ -180,6 +180,7 @@ static void add_task(struct validation *v, const struct suite_scene *s, struct s
 {
     struct claim_run *t = &v->task[v->num_tasks++];
     const struct engine *en = v->opt->engine;
+    bool widens = a->kind == SIDE_ENGINE && expected == VERDICT_EQUIVALENT;
     /* One noisy image is the same each time. */
     bool same_again = a->kind == SIDE_ENGINE && en->output == OUTPUT_NOISY;
     bool can_be_fresh = side_can_be_fresh(a) && side_can_be_fresh(b) && !same_again;
@@ -191,6 +192,10 @@ static void add_task(struct validation *v, const struct suite_scene *s, struct s
                             .looks = looks_of(v, a, b),
                             .stages = can_be_fresh ? v->stages : 1,
                             .history = json_array()};
+    if (widens) {
+        t->ref.margin_global = fmax(t->ref.margin_global, en->margin_global);
+        t->ref.margin_tile = fmax(t->ref.margin_tile, en->margin_tile);
+    }
     a->users++;
     b->users++;
     claim_next_look(t);

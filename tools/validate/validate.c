@@ -238,6 +238,11 @@ bool validate(const struct validate_options *opt, int argc, char **argv, json_t 
         goto done;
     if (opt->engine != NULL)
         json_object_set(root, "not_expressible", cannot);
+    if (opt->engine != NULL && opt->engine->margin_global > 0)
+        json_object_set_new(root, "engine_margin",
+                            json_pack("{ss,sf,sf,ss}", "engine", opt->engine->name, "global",
+                                      opt->engine->margin_global, "tile", opt->engine->margin_tile,
+                                      "reason", opt->engine->margin_reason));
     if (opt->live) {
         const struct import_options io = {
             .work_dir = opt->out_dir, .share_dir = opt->share_dir, .timeout_s = opt->timeout_s};

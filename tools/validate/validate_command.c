@@ -120,7 +120,11 @@ static bool load_engine(struct validate_command *c, struct err *e)
 static void print_not_expressible(const json_t *results)
 {
     size_t i;
-    const json_t *entry;
+    const json_t *entry, *margin = json_object_get(results, "engine_margin");
+    if (margin != NULL)
+        printf("%s declares margins of its own, %g %% of an image and %g %% of a tile: %s\n",
+               member_or_empty(margin, "engine"), 100 * member_number(margin, "global"),
+               100 * member_number(margin, "tile"), member_or_empty(margin, "reason"));
     json_array_foreach(json_object_get(results, "not_expressible"), i, entry)
         printf("%s cannot express %s: %s\n", member_text(entry, "engine"),
                member_text(entry, "scene"), member_text(entry, "reason"));
