@@ -38,7 +38,7 @@ struct number_text html_duration(double seconds);
 /* "2026-11-23T04:42:12Z" as "2026-11-23 05:42 CET", in the time zone of this machine; any other text as it stands. */
 struct number_text html_date(const char *utc);
 
-/* 0.0123, or 10 to the power of what is smaller. */
+/* 0.0123, or 10 to the power of what is smaller, or "below 10 to the -12". */
 void html_p_value(FILE *f, double log10_p);
 
 void html_base64(FILE *f, const void *bytes, size_t size);
