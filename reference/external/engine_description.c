@@ -14,6 +14,7 @@
 
 static const char *const format_names[] = {ENGINES(ENGINE_WORD) "dae", "file", NULL};
 static const char *const output_names[] = {"mean", "exact", "moments", "noisy", NULL};
+static const char *const channel_names[] = {"together", "separate", NULL};
 static const char *const image_names[] = {"exr", "hdr", "pfm", NULL};
 
 /* What a placeholder may be called in each of the arrays. */
@@ -185,6 +186,23 @@ static bool read_margin(const struct json_node *n, struct engine *en, struct err
            json_get_text(&m, "reason", en->margin_reason, sizeof en->margin_reason, e);
 }
 
+/* Only what we write can be written in grey, and the channels of moments cannot be put together from three files. */
+static bool read_channels(const struct json_node *n, struct engine *en, struct err *e)
+{
+    int word = 0;
+    if (json_object_get(n->object, "channels") != NULL &&
+        !get_word(n, "channels", channel_names, &word, e))
+        return false;
+    en->separate = word == 1;
+    if (en->separate && en->format == NULL)
+        return err_set(
+            e, "%s: 'channels' are separate in scenes that are exported, not with this 'format'",
+            n->file);
+    return !en->separate || en->output != OUTPUT_MOMENTS ||
+           err_set(e, "%s: 'channels' are separate in images, not with \"output\": \"moments\"",
+                   n->file);
+}
+
 static bool read_name(const struct json_node *n, struct engine *en, struct err *e)
 {
     static const char *const taken[] = {"truth", "pathtracer",
@@ -205,7 +223,8 @@ static bool read_engine(const char *path, struct engine *en, struct err *e)
     static const char *const keys[] = {
         "name",       "comment",   "format",           "command", "output",
         "image",      "expresses", "depth_offset",     "spp",     "version",
-        "replicates", "lens_args", "environment_args", "margin",  NULL};
+        "replicates", "lens_args", "environment_args", "margin",  "channels",
+        NULL};
     struct json_node n = {path, "", en->json};
     int word, image = 0;
     unsigned used;
@@ -230,7 +249,8 @@ static bool read_engine(const char *path, struct engine *en, struct err *e)
         return false;
     return read_features(&n, en, e) && read_command(&n, en, e) &&
            read_optional_int(&n, "depth_offset", -1, 1, &en->depth_offset, e) &&
-           read_margin(&n, en, e) && read_optional_int(&n, "spp", 1, 1 << 24, &en->spp, e) &&
+           read_margin(&n, en, e) && read_channels(&n, en, e) &&
+           read_optional_int(&n, "spp", 1, 1 << 24, &en->spp, e) &&
            read_optional_int(&n, "replicates", 3, 4096, &en->replicates, e) &&
            read_extra(&n, en, "lens_args", in_lens, FEATURE_LENS, e) &&
            read_extra(&n, en, "environment_args", in_environment, FEATURE_ENVIRONMENT, e);

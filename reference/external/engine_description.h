@@ -17,6 +17,8 @@ struct engine {
     enum engine_output output;
     char image[8];    /* "exr" */
     unsigned feature; /* bits, features.h */
+    /* A render for each channel, with all that the scene has in grey, as that channel is: for programs that make spectra of colours. */
+    bool separate;
     int depth_offset, spp, replicates;
     /* How far it may be off in every scene that is to be EQUIVALENT, whatever that scene's margins are, and why; 0: no more. */
     double margin_global, margin_tile;

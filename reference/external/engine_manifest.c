@@ -100,7 +100,8 @@ static json_t *seeds_of(const struct engine_job *j)
 {
     json_t *seeds = json_array();
     const bool has_seeds = j->en->output == OUTPUT_MEAN || j->en->output == OUTPUT_MOMENTS;
-    for (int k = 0; has_seeds && k < j->replicates; k++)
+    const int num = (j->en->separate ? 3 : 1) * j->replicates;
+    for (int k = 0; has_seeds && k < num; k++)
         json_array_append_new(seeds, json_integer(replicate_seed(j->opt->seed, k)));
     return seeds;
 }

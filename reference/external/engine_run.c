@@ -53,7 +53,7 @@ static bool command_line(const struct engine_job *j, uint32_t seed, const char *
                                   "threads",
                                   number[5],
                                   "scene",
-                                  j->scene,
+                                  j->scene[j->channel],
                                   "out",
                                   out,
                                   "here",
@@ -139,6 +139,34 @@ static float *read_image(struct engine_job *j, const char *path, struct err *e)
     return out;
 }
 
+/* Image k: one run, or one for each channel with a seed of its own, of which that channel counts. */
+static float *render_image(struct engine_job *j, int k, struct err *e)
+{
+    const struct path path = fs_path("%s/replicate_%04d.%s", j->dir, k, j->en->image);
+    const int runs = j->en->separate ? 3 : 1;
+    const size_t pixels = (size_t)j->suite->width * (size_t)j->suite->height;
+    float *out = NULL;
+    for (j->channel = 0; j->channel < runs; j->channel++) {
+        const size_t c = (size_t)j->channel;
+        float *px = run_process(j, replicate_seed(j->opt->seed, runs * k + j->channel), path.s, e)
+                        ? read_image(j, path.s, e)
+                        : NULL;
+        if (px == NULL) {
+            free(out);
+            return NULL;
+        }
+        unlink(path.s);
+        if (out == NULL) {
+            out = px;
+            continue;
+        }
+        for (size_t i = 0; i < pixels; i++)
+            out[3 * i + c] = px[3 * i + c];
+        free(px);
+    }
+    return out;
+}
+
 /* n: 1 of an exact image; of a noisy one 3, as noise_estimate.h has it, which is no count of anything. */
 static void make_single(struct moments *m, const char *unit, double n)
 {
@@ -158,10 +186,7 @@ static bool fold_runs(struct engine_job *j, struct moments *m, struct err *e)
     bool ok = replicate_repeats_alloc(&repeats, j->replicates, e) &&
               (!check || replicates_alloc(&seen, m->width, m->height, j->replicates, e));
     for (int k = 0; ok && k < j->replicates; k++) {
-        const struct path path = fs_path("%s/replicate_%04d.%s", j->dir, k, j->en->image);
-        float *px = run_process(j, replicate_seed(j->opt->seed, k), path.s, e)
-                        ? read_image(j, path.s, e)
-                        : NULL;
+        float *px = render_image(j, k, e);
         ok = px != NULL;
         if (!ok)
             break;
@@ -174,7 +199,6 @@ static bool fold_runs(struct engine_job *j, struct moments *m, struct err *e)
         if (check)
             replicates_add(&seen, px);
         free(px);
-        unlink(path.s);
     }
     if (ok && j->en->output == OUTPUT_NOISY)
         make_single(m, "picture", 3);

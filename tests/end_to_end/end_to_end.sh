@@ -541,6 +541,16 @@ verdict_of() { claims_of "$1" | awk -F '\t' -v a="$2" -v b="$3" '$1 == a && $2 =
 fake 'exec student_tracer "$@" 1.05'
 expect "a renderer that is 5 % too bright differs" 1 "fake *truth *+[45]\..*DIFFERENT *EQUIVALENT *WRONG" \
     env PATH="$engine_path" $student --engine "$tmp/fake.json"
+# One that makes spectra of colours, and mixes them by a tenth: right in grey, so with a run for each channel.
+fake 'awk -F "\"" -v OFS="\"" "/<rgb/ { split(\$4, v, \", *\"); m = (v[1] + v[2] + v[3]) / 3
+    \$4 = sprintf(\"%.9g, %.9g, %.9g\", v[1] + (m - v[1]) / 10, v[2] + (m - v[2]) / 10, v[3] + (m - v[3]) / 10) } 1" "$1" >"$1.xml"
+scene=$1.xml
+shift
+exec student_tracer "$scene" "$@"'
+expect "a renderer that mixes colours differs" 1 "fake *truth .*DIFFERENT *EQUIVALENT *WRONG" env PATH="$engine_path" $student --engine "$tmp/fake.json"
+sed 's/"expresses"/"channels": "separate", "expresses"/' "$tmp/fake.json" >"$tmp/apart.json"
+expect "and does not with each channel by itself" 0 "fake *truth .*EQUIVALENT *EQUIVALENT *ok" env PATH="$engine_path" $student --engine "$tmp/apart.json"
+fake 'exec student_tracer "$@" 1.05'
 # The commands that the results print for each claim, of a suite and an engine whose names a shell has to be told: each judges that claim
 # again, with the verdict that it had.
 mkdir "$tmp/my suite" "$tmp/my engine"

@@ -144,6 +144,7 @@ TEST(bad_descriptions_are_refused)
         {"format", "\"obj\"", "mitsuba, pbrt, dae"},
         {"output", "\"variance\"", "none of: mean, exact, moments"},
         {"output", "\"exact\"", "has a {seed}, but 'output' is 'exact'"},
+        {"channels", "\"apart\"", "none of: together, separate"},
         {"margin", "0.1", "'margin' is not an object"},
         {"margin", "{\"global\": 0.1, \"tile\": 0.2}", "missing key 'margin.reason'"},
         {"margin", "{\"global\": 1, \"tile\": 0.2, \"reason\": \"x\"}", "'margin.global' is 1"},
@@ -409,6 +410,46 @@ TEST(replicates_are_folded)
     fclose(f);
     snprintf(want, sizeof want, "7 %d 4 3 2\n", point_plane.depth + 1);
     assert_string_equal(args, want);
+    json_decref(manifest);
+    moments_free(&m);
+    engine_free(&en);
+}
+
+/* One run for each channel, each with a seed of its own and a scene in which all colours are grey, as they are in that channel:
+ * red of run 0, 3, 6 is the pixel's number times 1, 10, 37 (k^2 + 1): mean 16, M2 = 15^2 + 6^2 + 21^2 = 702; green is 2. */
+TEST(channels_are_rendered_apart)
+{
+    static const char *const grey[3][2] = {{"[3 3 3]", "[0.5 0.5 0.5]"},
+                                           {"[2 2 2]", "[0.600000024 0.600000024 0.600000024]"},
+                                           {"[1 1 1]", "[0.699999988 0.699999988 0.699999988]"}};
+    struct engine en;
+    struct moments m;
+    json_t *manifest;
+    struct err e;
+    for (int k = 0; k < 3 * K; k++) {
+        char name[64];
+        snprintf(name, sizeof name, "picture_%u.pfm", replicate_seed(SEED, k));
+        write_pfm(name, W, H, ramp, k);
+    }
+    engine_of_script("cp {here}/picture_$3.pfm $2 && cp $1 {here}/scene_$3",
+                     ", \"channels\": \"separate\"", &en);
+    MUST(render(&en, &point_plane, &m, &manifest, &e));
+    for (int p = 0; p < PIXELS; p++) {
+        double x = p + 1;
+        assert_true(m.n[p] == K);
+        assert_true(fabs(m.mean[3 * p] - 16 * x) < 1e-12 * x);
+        assert_true(fabs(m.m2[3 * p] - 702 * x * x) < 1e-11 * x * x);
+        assert_true(m.mean[3 * p + 1] == 2 && m.mean[3 * p + 2] == 0);
+    }
+    assert_int_equal(json_array_size(json_object_get(manifest, "seeds")), 3 * K);
+    for (int k = 0; k < 3 * K; k++) {
+        char name[64];
+        snprintf(name, sizeof name, "scene_%u", replicate_seed(SEED, k));
+        char *text = test_read(test_path(name));
+        assert_non_null(strstr(text, grey[k % 3][0]));
+        assert_non_null(strstr(text, grey[k % 3][1]));
+        free(text);
+    }
     json_decref(manifest);
     moments_free(&m);
     engine_free(&en);
