@@ -4,6 +4,8 @@ SECONDS_EACH ?= 60
 DEPS_TEST := libcmocka-dev zip ccache clang libclang-rt-dev libxml2-utils libembree-dev patch openimageio-tools chromium \
   $(DEPS_DEB) locales python3-numpy python3-jsonschema python3-pytest python3-venv python3-pip python3-setuptools python3-wheel \
   $(if $(shell command -v npm),,nodejs npm)
+# Version 4 where it is there, as embree_mesh.h; asked when it has been installed.
+LIB_EMBREE = -lembree$(if $(wildcard /usr/include/embree4/rtcore.h),4,3)
 DEPS_LINT := clang-tidy cppcheck llvm
 DEPS_SLURM := slurm-wlm munge
 $(BUILD)/deps-test: | $(BUILD)/deps
@@ -69,7 +71,7 @@ $(1)/no_memory/assay: $(1)/tools/commands/assay.c.o
 $(1)/no_memory/pathtracer $(1)/no_memory/assay: $(1)/tests/end_to_end/no_memory.c.o $(1)/tests/support/asan_options.c.o $(1)/libassay.a | $(1)/oiio.so
 	$$(link)
 $(1)/no_memory/%: TEST_LIBS := -Wl,--wrap=main,--wrap=dlopen,--wrap=wait4
-$(1)/tests/test_embree $(1)/tests/bench: TEST_LIBS := -lcmocka -lembree3
+$(1)/tests/test_embree $(1)/tests/bench: TEST_LIBS = -lcmocka $$(LIB_EMBREE)
 endef
 $(foreach b,$(BUILD) $(BUILD)/san $(BUILD)/tsan $(BUILD)/cov,$(eval $(call test_tree,$(b))))
 $(BUILD)/san/pathtracer $(BUILD)/san/assay: $(BUILD)/san/tests/support/asan_options.c.o

@@ -27,6 +27,7 @@ from prepare import Preparation
 from workshop import POOL_SPP, SMOKE_SPP, Workshop, cpu_now, limited, run
 
 HERE = os.path.dirname(os.path.abspath(__file__))
+EMBREE = "-lembree4" if os.path.exists("/usr/include/embree4") else "-lembree3"
 QUICK = 1.0  # seconds; longer unit tests are asked only where neither those nor validate find it
 VALIDATE_CPU = 25  # seconds that a mutant may spend with validate, after which it counts as not found
 
@@ -187,7 +188,7 @@ class Runner(Workshop):
                 return False
         program = os.path.join(fresh, test)
         if not self.link(program, [own, self.build + "/" + san + "tests/support/asan_options.c.o"] + list(objects.values()),
-                         [san + "libtests.a", san + "libassay.a"], flags + (["-lembree3"] if test == "test_embree" else [])):
+                         [san + "libtests.a", san + "libassay.a"], flags + ([EMBREE] if test == "test_embree" else [])):
             return False
         limit = (30 if san else 3) * self.info["tests"][test] + 2 + 8 * bool(san)
         p = subprocess.Popen([program], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace",

@@ -21,7 +21,6 @@
 #include "tests/support/mesh.h"
 #include "tests/support/test.h"
 
-#include <embree3/rtcore.h>
 #include <float.h>
 
 static vec3 random_point(uint32_t i, uint32_t k)
@@ -111,8 +110,8 @@ static RTCScene embree_scene(RTCDevice device, const struct scene *s)
 
 static struct hit embree_hit(RTCScene scene, const ray *r)
 {
-    struct RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
+    struct embree_query query;
+    embree_query_init(&query);
     struct RTCRayHit h = {.ray = {.org_x = r->o.x,
                                   .org_y = r->o.y,
                                   .org_z = r->o.z,
@@ -123,7 +122,7 @@ static struct hit embree_hit(RTCScene scene, const ray *r)
                                   .tfar = r->tmax,
                                   .mask = UINT32_MAX},
                           .hit = {.geomID = RTC_INVALID_GEOMETRY_ID}};
-    rtcIntersect1(scene, &context, &h);
+    embree_intersect(scene, &query, &h);
     return (struct hit){h.hit.geomID != RTC_INVALID_GEOMETRY_ID, h.ray.tfar, h.hit.primID};
 }
 

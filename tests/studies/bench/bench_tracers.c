@@ -8,8 +8,8 @@
 static void embree_trace(const struct tracer *t, const struct ray_set *s, bool shadow,
                          struct answer_key *a)
 {
-    struct RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
+    struct embree_query query;
+    embree_query_init(&query);
     for (size_t b = 0; b < ray_set_batches(s); b++) {
         const struct rays *r = &s->batch[b];
         struct hits *h = &a->hit[b];
@@ -24,12 +24,12 @@ static void embree_trace(const struct tracer *t, const struct ray_set *s, bool s
                                           .tfar = r->tmax[i],
                                           .mask = UINT32_MAX}};
             if (shadow) {
-                rtcOccluded1(t->scene, &context, &q.ray);
+                embree_occluded(t->scene, &query, &q.ray);
                 a->occluded[b][i] = q.ray.tfar < 0;
                 continue;
             }
             q.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-            rtcIntersect1(t->scene, &context, &q);
+            embree_intersect(t->scene, &query, &q);
             h->t[i] = q.ray.tfar;
             h->u[i] = q.hit.u;
             h->v[i] = q.hit.v;

@@ -6,7 +6,7 @@
 #include "renderer/bvh/bvh.h"
 #include "bench_sets.h"
 
-#include <embree3/rtcore.h>
+#include "embree_mesh.h"
 
 struct tracer {
     const char *name;

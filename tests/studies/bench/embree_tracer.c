@@ -79,13 +79,13 @@ static vec3 point_on(const struct scene *s, const struct light *l, float u, floa
 static rgb path(const struct embree_tracer *t, ray r, int depth, struct pcg *g)
 {
     const struct scene *s = t->scene;
-    struct RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
+    struct embree_query query;
+    embree_query_init(&query);
     rgb sum = {0, 0, 0}, beta = {1, 1, 1};
     for (int vertex = 0;; vertex++) {
         struct RTCRayHit q = {.ray = embree_ray(r.o, r.d, 1e30f)};
         q.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-        rtcIntersect1(t->embree.scene, &context, &q);
+        embree_intersect(t->embree.scene, &query, &q);
         if (q.hit.geomID == RTC_INVALID_GEOMETRY_ID)
             return sum;
         uint32_t i = q.hit.primID;
@@ -126,7 +126,7 @@ static rgb path(const struct embree_tracer *t, ray r, int depth, struct pcg *g)
             if (cos_i <= 0 || cos_l <= 0 || dot(ng, to) <= 0)
                 continue;
             struct RTCRay shadow = embree_ray(o, scale(to, 1 / d), d * (1 - 1e-4f));
-            rtcOccluded1(t->embree.scene, &context, &shadow);
+            embree_occluded(t->embree.scene, &query, &shadow);
             if (shadow.tfar < 0)
                 continue;
             float f = cos_i * cos_l * l->area / (d2 * PI_F);
