@@ -118,6 +118,9 @@ def build(dump):
         # No setting of Cycles ends a path at the camera's first hit: let nothing reflect.
         for m in dump["materials"]:
             m["kind"], m["reflectance"] = "diffuse", [0.0, 0.0, 0.0]
+    upper_half = (dump["environment"] or {}).get("kind") == "upper_half"
+    if bpy.app.version >= (3, 5, 0) and (dump["lights"] or upper_half) and any(m["kind"] == "microfacet" for m in dump["materials"]):
+        raise ValueError("rough metals under lights without area need Blender 3.4: Glossy of later versions has correlated shadowing")
     materials = [add_material(m) for m in dump["materials"]]
     for m in dump["meshes"]:
         positions, normals = m["positions"], m["normals"]

@@ -126,9 +126,12 @@ def main():
     args = parser.parse_args(sys.argv[sys.argv.index("--") + 1:])
     with open(args.jobs, encoding="utf-8") as f:
         jobs = json.load(f)
+    absent = None
+    if not getattr(bpy.app.build_options, "collada", False):
+        absent = json.dumps({"absent": f"Blender {bpy.app.version_string} of this machine does not import COLLADA"})
     for k, job in enumerate(jobs):
         try:
-            result = json.dumps(read(job), allow_nan=False)
+            result = absent or json.dumps(read(job), allow_nan=False)
         except (RuntimeError, ValueError, ElementTree.ParseError) as why:
             result = json.dumps({"error": " ".join(str(why).split())})
         with open(f"import_{k:04d}.json", "w", encoding="utf-8") as f:

@@ -52,7 +52,8 @@ bool import_check_run(const struct suite_scene *const *scene, int num,
     __attribute__((warn_unused_result));
 
 /* Both, and as JSON (a new reference): [{"scene", "agrees", "what" or "error", and all numbers of
- * the report}]. A scene that cannot be judged has "error". */
+ * the report}]. A scene that cannot be judged has "error"; where Blender has no importer of COLLADA (as built by Debian 13, and from
+ * 5.0 on), each has "absent" with the reason instead, and nothing was checked. */
 bool import_check(const struct suite_scene *const *scene, int num, const struct import_options *opt,
                   json_t **reports, struct err *e) __attribute__((warn_unused_result));
 
