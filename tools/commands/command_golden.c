@@ -41,6 +41,7 @@ static const struct cli_option options[] = {
      .usage =
          "usage: assay golden render [options]          candidates (see assay golden render --help)\n"
          "       assay golden status [options]          what is stored, and what is wrong with it\n"
+         "       assay golden compare [options] [SCENE | SCENE/ENGINE] ...  candidates against what is stored\n"
          "       assay golden approve [options] [--all] [SCENE | SCENE/ENGINE | SCENE/noise] ...\n"},
     {.noun = "names", CLI_TO_LIST(struct settings, names, num_names)}};
 
@@ -230,7 +231,8 @@ static int approve_all(const struct settings *s, const struct suite *suite, stru
     printf(
         "%d approved, %d unchanged, %d refused as DIFFERENT, %d as INCONCLUSIVE, %d impossible\n",
         count[APPROVE_ACCEPTED], count[APPROVE_UNCHANGED], count[APPROVE_DIFFERENT],
-        count[APPROVE_INCONCLUSIVE], count[APPROVE_IMPOSSIBLE] + (suite->is_own ? 0 : (int)orphans));
+        count[APPROVE_INCONCLUSIVE],
+        count[APPROVE_IMPOSSIBLE] + (suite->is_own ? 0 : (int)orphans));
     if (orphans > 0 && !suite->is_own && count[APPROVE_IMPOSSIBLE]++ == 0)
         err_set(e, "%s/%s: not in the suite", s->opt.from_dir, first);
     json_decref(names);
@@ -240,15 +242,52 @@ static int approve_all(const struct settings *s, const struct suite *suite, stru
                                              : EXIT_EQUIVALENT;
 }
 
+/* What an engine's new version changed: a table of all that have a candidate. */
+static int compare_all(const struct settings *s, const struct suite *suite, struct err *e)
+{
+    const struct suite_scene *scene;
+    const struct suite_reference *ref;
+    struct approve_options opt = s->opt;
+    int selected = 0, code = EXIT_EQUIVALENT;
+    enum verdict verdict = VERDICT_EQUIVALENT;
+    if (s->num_names > 0 && !check_names(s, suite, e))
+        return EXIT_NOT_JUDGED;
+    for (int i = 0; (ref = rendered_reference(suite, i, &scene)) != NULL; i++)
+        selected += is_selected(s, scene, ref) && has_candidate(s, scene, ref);
+    if (selected == 0) {
+        err_set(e, "no candidates in %s: `assay golden render` makes them", s->opt.from_dir);
+        return EXIT_NOT_JUDGED;
+    }
+    opt.alpha = s->opt.alpha / selected;
+    if (!approve_compare(&opt, NULL, NULL, stdout, &verdict, e))
+        return EXIT_NOT_JUDGED;
+    for (int i = 0; (ref = rendered_reference(suite, i, &scene)) != NULL; i++) {
+        struct err why = {0};
+        if (!is_selected(s, scene, ref) || !has_candidate(s, scene, ref))
+            continue;
+        if (!approve_compare(&opt, scene, ref, stdout, &verdict, &why)) {
+            printf("%-20s  not compared: %s\n", scene->name, why.msg);
+            if (code != EXIT_NOT_JUDGED)
+                *e = why;
+            code = EXIT_NOT_JUDGED;
+        } else if (verdict == VERDICT_DIFFERENT && code != EXIT_NOT_JUDGED)
+            code = EXIT_DIFFERENT;
+        else if (!verdict_decides(verdict) && code == EXIT_EQUIVALENT)
+            code = EXIT_INCONCLUSIVE;
+    }
+    return code;
+}
+
 int command_golden(int argc, char **argv, struct err *e)
 {
     struct settings s = {.opt = {.from_dir = "build/golden-candidate", .alpha = 1e-3}};
     const char *what = argc > 1 ? argv[1] : "";
     if (strcmp(what, "render") == 0)
         return command_reference(argc - 1, argv + 1, e);
-    bool is_status = strcmp(what, "status") == 0, is_verb = strcmp(what, "--help") != 0;
-    if (!is_status && is_verb && strcmp(what, "approve") != 0) {
-        err_set(e, "golden: '%s' is none of render, status, approve (see --help)", what);
+    bool is_status = strcmp(what, "status") == 0, compares = strcmp(what, "compare") == 0,
+         is_verb = strcmp(what, "--help") != 0;
+    if (!is_status && !compares && is_verb && strcmp(what, "approve") != 0) {
+        err_set(e, "golden: '%s' is none of render, status, compare, approve (see --help)", what);
         return EXIT_NOT_JUDGED;
     }
     if (!cli_read(options, argc - is_verb, argv + is_verb, &s, e))
@@ -271,7 +310,9 @@ int command_golden(int argc, char **argv, struct err *e)
         s.opt.golden_dir = suite_own_is(s.suite_dir) ? at.golden.s : "golden";
     if (!suite_load(s.suite_dir, &suite, e))
         return EXIT_NOT_JUDGED;
-    int code = is_status ? status(&s, &suite, e) : approve_all(&s, &suite, e);
+    int code = is_status  ? status(&s, &suite, e)
+               : compares ? compare_all(&s, &suite, e)
+                          : approve_all(&s, &suite, e);
     suite_free(&suite);
     return code;
 }

@@ -2,7 +2,6 @@
 
 #include "reference/base/utc_date.h"
 #include "tools/compare/region.h"
-#include "tools/compare/verdict.h"
 
 #include <string.h>
 
@@ -206,4 +205,51 @@ enum approval approve(const struct approve_options *opt, const struct suite_scen
     golden_free(&candidate);
     golden_free(&stored);
     return done;
+}
+
+/* Whatever versions and scene files they were made with, they are to be compared: only a damaged one cannot be. */
+static bool can_compare(const struct golden *g, const char *dir, struct err *e)
+{
+    if (g->state != GOLDEN_MISSING && g->state != GOLDEN_DAMAGED)
+        return true;
+    *e = g->why;
+    return err_prefix(e, "%s in %s", golden_state_name(g->state), dir);
+}
+
+bool approve_compare(const struct approve_options *opt, const struct suite_scene *scene,
+                     const struct suite_reference *ref, FILE *out, enum verdict *verdict,
+                     struct err *e)
+{
+    if (scene == NULL) {
+        fprintf(out, "%-20s  %-26s  %-26s  %-26s  %8s  %s\n", "scene", "candidate", "stored",
+                "difference % [interval]", "margin %", "verdict");
+        return true;
+    }
+    struct golden candidate, stored;
+    struct comparison r = {0};
+    golden_inspect(opt->from_dir, scene, ref, &candidate);
+    golden_inspect(opt->golden_dir, scene, ref, &stored);
+    const struct compare_options co = {.alpha = opt->alpha,
+                                       .margin_global = ref->margin_global,
+                                       .margin_tile = ref->margin_tile,
+                                       .tile = scene->tile};
+    bool ok = can_compare(&candidate, opt->from_dir, e) && can_compare(&stored, opt->golden_dir, e);
+    bool same = ok && same_moments(&candidate.m, &stored.m);
+    ok = ok && (same || compare_moments(&candidate.m, &stored.m, &co, &r, e));
+    if (ok) {
+        const struct region *g = &r.global[3];
+        char effect[64] = "the same bits";
+        if (!same)
+            snprintf(effect, sizeof effect, "%+.3f [%+.3f, %+.3f]", 100 * g->difference,
+                     100 * g->ci_lo, 100 * g->ci_hi);
+        *verdict = same ? VERDICT_EQUIVALENT : r.verdict;
+        fprintf(out, "%-20s  %-26.26s  %-26.26s  %-26s  %8g  %s\n", scene->name,
+                text_of(candidate.manifest, "version"), text_of(stored.manifest, "version"), effect,
+                100 * ref->margin_global, verdict_name(*verdict));
+        if (!same)
+            comparison_free(&r);
+    }
+    golden_free(&candidate);
+    golden_free(&stored);
+    return ok || err_prefix(e, "%s/%s", scene->name, ref->engine);
 }

@@ -4,6 +4,7 @@
 #define ASSAY_APPROVE_H
 
 #include "reference/store/reference_render.h"
+#include "tools/compare/verdict.h"
 
 #include <stdio.h>
 
@@ -32,5 +33,11 @@ enum approval {
  * exr_sha256, date}}. */
 enum approval approve(const struct approve_options *opt, const struct suite_scene *scene,
                       const struct suite_reference *ref, FILE *out, struct err *e);
+
+/* Stores nothing: one line of a table, whose heading is written for `out` with scene NULL: the versions of both, the difference, the
+ * verdict, which *verdict gets. False, with a line, if they cannot be compared. opt: from_dir, golden_dir, alpha. */
+bool approve_compare(const struct approve_options *opt, const struct suite_scene *scene,
+                     const struct suite_reference *ref, FILE *out, enum verdict *verdict,
+                     struct err *e) __attribute__((warn_unused_result));
 
 #endif

@@ -220,6 +220,40 @@ TEST_WITH(a_difference_needs_a_reason, setup, teardown)
     assert_accepted(f, 2, "EQUIVALENT"); /* the log goes on */
 }
 
+static enum verdict compared(struct fixture *f)
+{
+    char before[2][65], after[2][65];
+    enum verdict verdict = VERDICT_INCONCLUSIVE;
+    struct err e;
+    FILE *out = fmemopen(f->said, sizeof f->said, "w");
+    hash_store(f, before);
+    MUST(approve_compare(&f->opt, &f->scene, &f->ref, out, &verdict, &e));
+    fclose(out);
+    hash_store(f, after);
+    assert_memory_equal(before, after, sizeof before);
+    return verdict;
+}
+
+/* Nothing is stored; the difference put there is found, and what is missing is said. */
+TEST_WITH(a_table_compares_without_storing, setup, teardown)
+{
+    struct fixture *f = *state;
+    enum verdict verdict;
+    struct err e;
+    render(f, f->golden, 1, 1);
+    REFUSES(approve_compare(&f->opt, &f->scene, &f->ref, stderr, &verdict, &e), "missing in ");
+    render(f, f->from, 1, 1);
+    assert_int_equal(compared(f), VERDICT_EQUIVALENT);
+    assert_non_null(strstr(f->said, "the same bits"));
+    render(f, f->from, 1, 2);
+    assert_int_equal(compared(f), VERDICT_EQUIVALENT);
+    render(f, f->from, 1.1, 2);
+    assert_int_equal(compared(f), VERDICT_DIFFERENT);
+    assert_non_null(strstr(f->said, "Blender 3.4.1"));
+    assert_non_null(strchr(f->said, '+'));
+    assert_float_equal(strtod(strchr(f->said, '+'), NULL), 10, 1); /* % */
+}
+
 /* Equal means, but margins far below what the noise of the two can show. */
 TEST_WITH(an_inconclusive_one_is_refused_whatever_is_said, setup, teardown)
 {
