@@ -224,7 +224,7 @@ static bool read_engine(const char *path, struct engine *en, struct err *e)
         "name",       "comment",   "format",           "command", "output",
         "image",      "expresses", "depth_offset",     "spp",     "version",
         "replicates", "lens_args", "environment_args", "margin",  "channels",
-        NULL};
+        "scale",      NULL};
     struct json_node n = {path, "", en->json};
     int word, image = 0;
     unsigned used;
@@ -250,6 +250,8 @@ static bool read_engine(const char *path, struct engine *en, struct err *e)
     return read_features(&n, en, e) && read_command(&n, en, e) &&
            read_optional_int(&n, "depth_offset", -1, 1, &en->depth_offset, e) &&
            read_margin(&n, en, e) && read_channels(&n, en, e) &&
+           (json_object_get(en->json, "scale") == NULL ||
+            json_get_number(&n, "scale", 0, 1e30, &en->scale, e)) &&
            read_optional_int(&n, "spp", 1, 1 << 24, &en->spp, e) &&
            read_optional_int(&n, "replicates", 3, 4096, &en->replicates, e) &&
            read_extra(&n, en, "lens_args", in_lens, FEATURE_LENS, e) &&
@@ -258,7 +260,7 @@ static bool read_engine(const char *path, struct engine *en, struct err *e)
 
 bool engine_load(const char *path, struct engine *out, struct err *e)
 {
-    struct engine en = {.spp = 64, .replicates = 16};
+    struct engine en = {.spp = 64, .replicates = 16, .scale = 1};
     char full[PATH_MAX];
     json_error_t why;
     if (realpath(path, full) == NULL)

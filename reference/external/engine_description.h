@@ -20,6 +20,7 @@ struct engine {
     /* A render for each channel, with all that the scene has in grey, as that channel is: for programs that make spectra of colours. */
     bool separate;
     int depth_offset, spp, replicates;
+    double scale; /* of its images' numbers, to be radiance */
     /* How far it may be off in every scene that is to be EQUIVALENT, whatever that scene's margins are, and why; 0: no more. */
     double margin_global, margin_tile;
     char margin_reason[512];

@@ -125,7 +125,7 @@ static float *read_image(struct engine_job *j, const char *path, struct err *e)
     else if ((out = malloc(values * sizeof *out)) == NULL)
         err_set(e, "%s: out of memory", path);
     for (size_t i = 0; out != NULL && i < values; i++) {
-        out[i] = im.data[i / 3 * (size_t)im.channels + (size_t)at[i % 3]];
+        out[i] = (float)(j->en->scale * im.data[i / 3 * (size_t)im.channels + (size_t)at[i % 3]]);
         if (!isfinite(out[i]) && bad == values)
             bad = i;
     }
@@ -211,6 +211,15 @@ static bool fold_runs(struct engine_job *j, struct moments *m, struct err *e)
     return ok;
 }
 
+static void scale_moments(struct moments *m, double scale)
+{
+    for (size_t i = 0; i < 3 * (size_t)m->width * (size_t)m->height; i++) {
+        m->mean[i] *= scale;
+        m->m2[i] *= scale * scale;
+        m->m3[i] *= scale * scale * scale;
+    }
+}
+
 static bool run_all(struct engine_job *j, struct moments *out, struct err *e)
 {
     char path[PATH_SIZE];
@@ -223,6 +232,8 @@ static bool run_all(struct engine_job *j, struct moments *out, struct err *e)
         if (ok && (m.width != j->suite->width || m.height != j->suite->height))
             ok = err_set(e, "%s: %d x %d pixels, not %d x %d", path, m.width, m.height,
                          j->suite->width, j->suite->height);
+        if (m.mean != NULL)
+            scale_moments(&m, j->en->scale);
     } else {
         ok = moments_alloc(&m, j->suite->width, j->suite->height, e);
         strcpy(m.unit, "replicate");

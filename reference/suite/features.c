@@ -109,7 +109,7 @@ static unsigned material_features(const struct material *m)
         break;
     }
     if (!rgb_is_zero(m->radiance))
-        f |= 1u << FEATURE_AREA | (m->radiance_both_sides ? 1u << FEATURE_TWO_SIDED : 0);
+        f |= 1u << (m->radiance_both_sides ? FEATURE_TWO_SIDED : FEATURE_AREA);
     return f;
 }
 

@@ -138,7 +138,7 @@ static bool scene_traits(const struct suite_scene *s, uint64_t *bits, struct err
     if (!suite_open(s, &scene, &camera, e))
         return false;
     const unsigned features = features_of_scene(&scene, &camera);
-    *bits = features;
+    *bits = features | (features & 1u << FEATURE_TWO_SIDED ? bit(FEATURE_AREA) : 0);
     for (size_t i = 0; i < sizeof classes / sizeof *classes; i++)
         *bits |= features & classes[i].of ? bit(classes[i].trait) : 0;
     for (uint32_t i = 0; i < scene.num_materials; i++)

@@ -144,6 +144,7 @@ TEST(bad_descriptions_are_refused)
         {"format", "\"obj\"", "mitsuba, pbrt, dae"},
         {"output", "\"variance\"", "none of: mean, exact, moments"},
         {"output", "\"exact\"", "has a {seed}, but 'output' is 'exact'"},
+        {"scale", "0", "'scale' is 0, not between"},
         {"channels", "\"apart\"", "none of: together, separate"},
         {"margin", "0.1", "'margin' is not an object"},
         {"margin", "{\"global\": 0.1, \"tile\": 0.2}", "missing key 'margin.reason'"},
@@ -315,7 +316,7 @@ TEST(materials_and_lights_have_features)
         uint32_t m = build_material(&s, grey(0), grey(0));
         if (i < 7) {
             s.materials[m] = materials[i];
-            want = 1u << of_material[i] | (i == 6 ? 1u << FEATURE_AREA : 0);
+            want = 1u << of_material[i];
         }
         build_quad(&s, v3(-1, -1, -3), v3(2, 0, 0), v3(0, 2, 0), m);
         if (i == 7 || i == 8) {
@@ -479,6 +480,32 @@ TEST(images_without_noise_are_exact)
     assert_string_equal(m.unit, "exact");
     assert_true(m.n[11] == 1 && m.mean[3 * 11] == 12 && m.m2[3 * 11] == 0);
     assert_int_equal(json_array_size(json_object_get(manifest, "seeds")), 0);
+    json_decref(manifest);
+    moments_free(&m);
+    engine_free(&en);
+    /* Its unit is 0.25 of ours. */
+    must_load(
+        "{\"name\": \"x\", \"format\": \"file\", \"output\": \"exact\", \"image\": \"pfm\", "
+        "\"scale\": 0.25, \"command\": [\"sh\", \"-c\", \"cp {here}/ramp.pfm {out} # {scene}\"]}",
+        &en);
+    MUST(render(&en, &point_plane, &m, &manifest, &e));
+    assert_true(m.mean[3 * 11] == 3 && m.mean[3 * 11 + 1] == 0.5);
+    json_decref(manifest);
+    moments_free(&m);
+    engine_free(&en);
+    struct moments own;
+    assert_true(moments_alloc(&own, W, H, &e));
+    for (int p = 0; p < PIXELS; p++) {
+        own.n[p] = 5;
+        own.mean[3 * p] = own.m2[3 * p] = own.m3[3 * p] = 1;
+    }
+    assert_true(moments_write(test_path("own.exr"), &own, NULL, 0, &e));
+    moments_free(&own);
+    must_load("{\"name\": \"x\", \"format\": \"file\", \"output\": \"moments\", \"scale\": 0.25, "
+              "\"command\": [\"sh\", \"-c\", \"cp {here}/own.exr {out} # {scene}\"]}",
+              &en);
+    MUST(render(&en, &point_plane, &m, &manifest, &e));
+    assert_true(m.n[3] == 5 && m.mean[9] == 0.25 && m.m2[9] == 0.0625 && m.m3[9] == 0.015625);
     json_decref(manifest);
     moments_free(&m);
     engine_free(&en);
