@@ -214,8 +214,8 @@ rubric-bugs: all $(BUILD)/deps-test $(BUILD)/libassay.a $(BUILD)/tests/make_rubr
 	tests/mutants/mutants.sh --build-only --patches tests/studies/grading/bugs $(BUILD)
 	$(BUILD)/tests/make_rubric_bugs $(BUILD) tests/mutants $(RUBRICS)
 
-#: make writeup    the figures and tables of the course's write-up in one page (BUILD/writeup; SHRINK=4: smaller images;
-#:                 VERDICTS=1: two scenes against Blender and POV-Ray too)
+#: make writeup    the figures and tables of the course's write-up in one page (BUILD/writeup; 12 CPU minutes, and goes on
+#:                 where it was ended; SHRINK=4: smaller images; VERDICTS=1: two scenes against Blender and POV-Ray, 8 more)
 writeup: $(BUILD)/assay $(BUILD)/pathtracer
 	VERDICTS=$(VERDICTS) tests/studies/writeup/writeup.sh $(BUILD) $(SHRINK)
 #: make pictures   the two images that README shows (tools/docs/images)
