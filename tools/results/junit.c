@@ -78,8 +78,7 @@ static bool write_verdict(xmlTextWriter *w, const json_t *claim, enum outcome ou
                attribute(w, "message", member_text(claim, "error")) &&
                xmlTextWriterEndElement(w) >= 0;
     if (outcome == OUTCOME_AS_EXPECTED)
-        return xmlTextWriterStartElement(w, BAD_CAST "system-out") >= 0 &&
-               write_numbers(w, claim) && xmlTextWriterEndElement(w) >= 0;
+        return true; /* its numbers are in the suite's output: Ant's schema lets a test that passes say nothing */
     char message[128];
     snprintf(message, sizeof message, "%.40s, expected %.40s", member_text(claim, "verdict"),
              member_text(claim, "expected"));
@@ -89,18 +88,37 @@ static bool write_verdict(xmlTextWriter *w, const json_t *claim, enum outcome ou
            write_text(w, "\n") && write_numbers(w, claim) && xmlTextWriterEndElement(w) >= 0;
 }
 
-static bool write_testcase(xmlTextWriter *w, const json_t *claim)
+static bool write_name(xmlTextWriter *w, const json_t *claim)
 {
     const char *quantity = member_text(claim, "quantity");
+    return write_text(w, member_text(claim, "a")) && write_text(w, " against ") &&
+           write_text(w, member_text(claim, "b")) && write_text(w, ": ") &&
+           write_text(w, quantity != NULL ? quantity : "mean");
+}
+
+static bool write_testcase(xmlTextWriter *w, const json_t *claim)
+{
     return xmlTextWriterStartElement(w, BAD_CAST "testcase") >= 0 &&
            attribute(w, "classname", member_text(claim, "scene")) &&
-           xmlTextWriterStartAttribute(w, BAD_CAST "name") >= 0 &&
-           write_text(w, member_text(claim, "a")) && write_text(w, " against ") &&
-           write_text(w, member_text(claim, "b")) && write_text(w, ": ") &&
-           write_text(w, quantity != NULL ? quantity : "mean") &&
+           xmlTextWriterStartAttribute(w, BAD_CAST "name") >= 0 && write_name(w, claim) &&
            xmlTextWriterEndAttribute(w) >= 0 &&
            number_attribute(w, "time", "%.3f", member_number(claim, "seconds_a")) &&
            write_verdict(w, claim, results_claim_outcome(claim)) && xmlTextWriterEndElement(w) >= 0;
+}
+
+/* A line for each that is as expected. */
+static bool write_output(xmlTextWriter *w, const json_t *claims)
+{
+    bool ok = xmlTextWriterStartElement(w, BAD_CAST "system-out") >= 0;
+    for (size_t i = 0; ok && i < json_array_size(claims); i++) {
+        const json_t *claim = json_array_get(claims, i);
+        ok = results_claim_outcome(claim) != OUTCOME_AS_EXPECTED ||
+             (write_text(w, member_text(claim, "scene")) && write_text(w, ": ") &&
+              write_name(w, claim) && write_text(w, ": ") && write_numbers(w, claim) &&
+              write_text(w, "\n"));
+    }
+    return ok && xmlTextWriterEndElement(w) >= 0 &&
+           xmlTextWriterWriteElement(w, BAD_CAST "system-err", BAD_CAST "") >= 0;
 }
 
 static bool write_testsuite(xmlTextWriter *w, const json_t *results, const json_t *claims)
@@ -109,6 +127,8 @@ static bool write_testsuite(xmlTextWriter *w, const json_t *results, const json_
     for (size_t i = 0; i < num; i++)
         count[results_claim_outcome(json_array_get(claims, i))]++;
     size_t failures = count[OUTCOME_OPPOSITE] + count[OUTCOME_UNDECIDED];
+    char date[20]; /* without its zone, which is UTC: Ant's schema has none */
+    snprintf(date, sizeof date, "%.19s", member_or_empty(results, "date"));
     bool ok = xmlTextWriterSetIndent(w, 1) >= 0 &&
               xmlTextWriterStartDocument(w, NULL, "UTF-8", NULL) >= 0 &&
               xmlTextWriterStartElement(w, BAD_CAST "testsuite") >= 0 &&
@@ -116,10 +136,11 @@ static bool write_testsuite(xmlTextWriter *w, const json_t *results, const json_
               number_attribute(w, "failures", "%.0f", (double)failures) &&
               number_attribute(w, "errors", "%.0f", (double)count[OUTCOME_NOT_JUDGED]) &&
               number_attribute(w, "time", "%.3f", member_number(results, "seconds")) &&
-              attribute(w, "timestamp", member_text(results, "date"));
+              attribute(w, "timestamp", date) && attribute(w, "hostname", "localhost") &&
+              xmlTextWriterWriteElement(w, BAD_CAST "properties", BAD_CAST "") >= 0;
     for (size_t i = 0; ok && i < num; i++)
         ok = write_testcase(w, json_array_get(claims, i));
-    return ok && xmlTextWriterEndDocument(w) >= 0;
+    return ok && write_output(w, claims) && xmlTextWriterEndDocument(w) >= 0;
 }
 
 bool junit_write(const char *path, const json_t *results, struct err *e)

@@ -425,8 +425,23 @@ TEST(junit_reads_back)
     assert_attribute(suite, "failures", "2");
     assert_attribute(suite, "errors", "1");
     assert_attribute(suite, "time", "98.125");
-    assert_attribute(suite, "timestamp", "2026-01-02T03:04:05Z");
+    assert_attribute(suite, "timestamp", "2026-01-02T03:04:05");
+    assert_attribute(suite, "hostname", "localhost");
     assert_int_equal(count_children(suite, "testcase"), 4);
+    /* The order that Ant's schema asks for, and no output within a test. */
+    xmlNode *first = xmlFirstElementChild(suite), *last = xmlLastElementChild(suite);
+    assert_string_equal((const char *)first->name, "properties");
+    assert_string_equal((const char *)last->name, "system-err");
+    xmlNode *said = xmlPreviousElementSibling(last);
+    assert_string_equal((const char *)said->name, "system-out");
+    xmlChar *output = xmlNodeGetContent(said);
+    assert_non_null(
+        strstr((const char *)output, "41_cornell: pathtracer against cycles: mean: difference "));
+    assert_null(
+        strchr(strchr((const char *)output, '\n') + 1, '\n')); /* of the one that is as expected */
+    xmlFree(output);
+    for (int i = 0; i < 4; i++)
+        assert_int_equal(count_children(child(suite, "testcase", i), "system-out"), 0);
 
     xmlNode *test = child(suite, "testcase", 0);
     assert_attribute(test, "classname", "41_cornell");
