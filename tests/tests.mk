@@ -12,6 +12,8 @@ $(BUILD)/deps-test: | $(BUILD)/deps
 	$(call install_missing,$(DEPS_TEST))
 $(BUILD)/deps-lint: | $(BUILD)/deps-test
 	$(call install_missing,$(DEPS_LINT))
+$(BUILD)/deps-distros: | $(BUILD)/deps
+	$(call install_missing,mmdebstrap)
 $(BUILD)/deps-slurm: | $(BUILD)/deps
 	$(call install_missing,$(DEPS_SLURM))
 
@@ -160,6 +162,9 @@ coverage: all $(BUILD)/no_memory/pathtracer $(BUILD)/cov/no_memory/pathtracer $(
 #: make slurm      jobs on a Slurm cluster of four nodes on this machine, one killed (as root; a minute)
 slurm: $(BUILD)/pathtracer $(BUILD)/assay $(BUILD)/deps-slurm
 	tests/studies/scale/slurm.sh $(BUILD)
+#: make distros    all of it in new minimal roots of Debian 12 and 13 (as root, with mmdebstrap: an hour and a half; SUITES=trixie STEPS="build live")
+distros: $(BUILD)/deps-distros
+	SUITES="$(SUITES)" tests/studies/distros/distros.sh $(BUILD)/distros $(STEPS)
 #: make scale-live live references and validations in jobs, with Blender and POV-Ray (minutes)
 scale-live: $(BUILD)/pathtracer $(BUILD)/assay $(BUILD)/deps-live
 	tests/studies/scale/scale_live.sh $(BUILD)
@@ -239,5 +244,5 @@ print-libs:
 print-kernels:
 	@$(foreach k,$(BY_ISA),$(foreach i,$(call isas_of,$(k)),echo $(k)_$(i).c $(k).c $(call isa_flags,$(i));))
 
-.PHONY: check lint order threads tsan faults pairs slurm scale-live large scale coverage fuzz mutants machine-mutants catalogue diagnose-rates calibrate anchors \
+.PHONY: check lint order threads tsan faults pairs slurm distros scale-live large scale coverage fuzz mutants machine-mutants catalogue diagnose-rates calibrate anchors \
   bench bench-rays bvh-table rubric-bugs writeup pictures print-compile print-sanitize print-sanitized print-libs print-kernels programs-san programs-clang programs-fuzz programs-no-memory
