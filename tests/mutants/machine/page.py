@@ -132,11 +132,14 @@ def write_page(folder):
         page.append("| %s | %d | %d | %d | %d | %d | %d | %d |" % (
             f[len("renderer/"):], len(rows), sum(a and b for a, b in zip(u, v)), sum(a and not b for a, b in zip(u, v)),
             sum(b and not a for a, b in zip(u, v)), sum(not a and not b for a, b in zip(u, v)), len(seen), sum(map(by_validate, seen))))
-    page += ["", "## Survivors of sample 1", "", "Lines are those of the state that was measured; `mutate.py --show ID` finds a mutant as long as its line stands.",
-             "", "| mutant | place | operator | before | after | changes an image | why `validate` did not find it |",
-             "|---|---|---|---|---|---|---|"]
-    for r in samples[0]:
-        if r["kind"] == "mutant" and not by_unit(r) and not by_validate(r):
+    for number, rows in enumerate(samples, 1):
+        left = [r for r in rows if r["kind"] == "mutant" and not by_unit(r) and not by_validate(r)]
+        if not rows:
+            continue
+        page += ["", f"## Survivors of sample {number}", "", "Lines are those of the state that was measured; `mutate.py --show ID` finds a mutant as long as its line stands.",
+                 "", "| mutant | place | operator | before | after | changes an image | why `validate` did not find it |",
+                 "|---|---|---|---|---|---|---|"]
+        for r in left:
             page.append("| %s | %s:%s | %s | `%s` | `%s` | %s | %s |" % (
                 r["id"], r["file"][len("renderer/"):], r["line"], r["operator"], escape(r["before"]), escape(r["after"]) or " ",
                 "yes" if r["image"] == "1" else "no", r["by"]))

@@ -554,7 +554,11 @@ TEST(smooth_surfaces)
     struct material refraction = glass;
     refraction.kind = MATERIAL_REFRACTION;
     assert_true(bsdf_sample_direction(&refraction, false, flat, 0, 0, 0).pdf_w == 0);
-    assert_true(bsdf_sample_direction(&glass, false, flat, 0, 0, 1 - 0x1p-24f).wi.z > 0);
+    /* Beyond the critical angle all is reflected, as much of each colour as ever. */
+    struct bsdf_sample total = bsdf_sample_direction(&glass, false, flat, 0, 0, 1 - 0x1p-24f);
+    assert_true(total.wi.x == -flat.x && total.wi.y == -flat.y && total.wi.z == flat.z);
+    assert_true(total.delta && total.pdf_w == 1 && total.eta2 == 1);
+    assert_true(total.weight.r == 1 && total.weight.g == 0.5f && total.weight.b == 0.25f);
     struct material mirror = {.kind = MATERIAL_MIRROR, .reflectance = {0.9f, 0.8f, 0.7f}};
     struct bsdf_sample s = bsdf_sample_direction(&mirror, false, wo, 0.3f, 0.4f, 0.5f);
     assert_true(s.delta && s.wi.x == -wo.x && s.wi.z == wo.z && s.weight.b == 0.7f);
