@@ -130,10 +130,10 @@ class Runner(Workshop):
         worst = ("", "")
         for c in r["claims"] + r["consistency"]:
             where = "%s %s" % (c["scene"], "consistency" if "engine" in c else (c["a"] + "/" if c["a"] != "pathtracer" else "").replace("pathtracer-", "") + c["b"])
-            if c["verdict"] == "DIFFERENT" and not c.get("passed", False):
+            if c.get("verdict") == "DIFFERENT" and not c.get("passed", False):
                 return "DIFFERENT", where
-            if not c.get("passed", False):
-                worst = ("INCONCLUSIVE" if c["verdict"] in ("INCONCLUSIVE", "NO DIFFERENCE FOUND") else "DIED", where)
+            if not c.get("passed", False):  # without a verdict: its image cannot be judged
+                worst = ("INCONCLUSIVE" if c.get("verdict") in ("INCONCLUSIVE", "NO DIFFERENCE FOUND") else "DIED", where)
         if worst[0] == "" and status not in (0, 1, 2):
             return "DIED", scene
         return worst
