@@ -1,6 +1,7 @@
 /* Hierarchies against brute force: the same nearest hit, bit for bit, and the same answer on
  * occlusion; and intersections against closed forms. */
 #include "renderer/bvh/bvh.h"
+#include "renderer/bvh/small_scene.h"
 #include "renderer/math/sampler.h"
 #include "renderer/scene/shape.h"
 #include "renderer/math/warp.h"
@@ -199,5 +200,110 @@ TEST(no_self_intersection)
         assert_true(h.prim[0] != prim);
     }
     bvh_free(bvh);
+    scene_free(&s);
+}
+
+/* One to twenty rays, of a list and of a tree: lanes behind the last of the list are none. */
+TEST(few_rays)
+{
+    struct err e = {0};
+    for (enum layout layout = SCATTERED; layout <= ONE; layout += ONE - SCATTERED) {
+        struct scene s = make_scene(layout);
+        struct bvh *all = bvh_build(&s, BVH_BRUTE_FORCE, &e), *wide = bvh_build(&s, BVH_WIDE, &e);
+        MUST(all != NULL && wide != NULL);
+        for (int n = 1; n <= 20; n++) {
+            struct rays r;
+            uint16_t lane[20];
+            for (int i = 0; i < 20; i++) {
+                rays_set(&r, i, make_ray(&s, (uint32_t)(20 * n + i)));
+                r.ignore[i] = NO_HIT;
+                lane[i] = (uint16_t)i;
+            }
+            struct hits h[2];
+            bool occluded[2][BATCH_LANES];
+            struct bvh_stats stats = {0};
+            for (int k = 0; k < 2; k++) {
+                memset(&h[k], 0, sizeof h[k]);
+                memset(occluded[k], 0, sizeof occluded[k]);
+                uint16_t *exact = malloc((size_t)n * sizeof *exact); /* no room behind it */
+                assert_non_null(exact);
+                memcpy(exact, lane, (size_t)n * sizeof *exact);
+                bvh_closest(k == 0 ? all : wide, &r, exact, n, &h[k], &stats);
+                bvh_occluded(k == 0 ? all : wide, &r, exact, n, occluded[k], &stats);
+                free(exact);
+            }
+            for (int i = 0; i < 20; i++) {
+                assert_true(h[0].t[i] == h[1].t[i]);
+                assert_true(occluded[0][i] == occluded[1][i]);
+            }
+        }
+        bvh_free(all);
+        bvh_free(wide);
+        scene_free(&s);
+    }
+}
+
+/* A cube of six squares, a triangle and two spheres apart from it. A cube has 8 corners, 12 edges and 6 faces; each square
+ * is two triangles of one face, with a diagonal between. */
+TEST(corners_edges_and_faces)
+{
+    struct err e = {0};
+    struct scene s = build_scene();
+    uint32_t m = build_material(&s, grey(0.5f), grey(0));
+    build_quad(&s, v3(0, 0, 0), v3(0, 1, 0), v3(1, 0, 0), m);
+    build_quad(&s, v3(0, 0, 1), v3(1, 0, 0), v3(0, 1, 0), m);
+    build_quad(&s, v3(0, 0, 0), v3(1, 0, 0), v3(0, 0, 1), m);
+    build_quad(&s, v3(0, 1, 0), v3(0, 0, 1), v3(1, 0, 0), m);
+    build_quad(&s, v3(0, 0, 0), v3(0, 0, 1), v3(0, 1, 0), m);
+    build_quad(&s, v3(1, 0, 0), v3(0, 1, 0), v3(0, 0, 1), m);
+    build_triangle(&s, v3(3, 0, 0), v3(-7, 0, 0), v3(3, 1, 0), m);
+    build_sphere(&s, v3(9, 1, 2), 0.5f, 1, m);
+    build_sphere(&s, v3(4, 1, 2), 0.25f, -1, m);
+    MUST(scene_finish(&s, "test", &e));
+    uint32_t prim[15];
+    for (uint32_t i = 0; i < 15; i++)
+        prim[i] = i;
+    static struct small_scene f;
+    small_scene_fill(&s, prim, 15, &f);
+    assert_int_equal(f.num_triangles, 13);
+    assert_int_equal(f.num_spheres, 2);
+    assert_int_equal(f.num_corners, 8 + 3);
+    assert_int_equal(f.num_edges, 12 + 6 + 3);
+    assert_int_equal(f.num_faces, 6 + 1);
+    assert_true(f.reach == 7);
+    for (int i = 0; i < 15; i++)
+        assert_int_equal(f.number[i], i);
+    assert_true(f.sphere[0][0] == 9 && f.sphere[0][3] == 0.5f && f.sphere[1][0] == 4 &&
+                f.sphere[1][3] == 0.25f);
+    int seen[15] = {0};
+    for (int i = 0; i < f.num_faces; i++) {
+        const struct flat_face *face = &f.face[i];
+        const bool alone = face->prim[0] == 12;
+        assert_int_equal(face->is_triangle, alone);
+        seen[face->prim[0]]++;
+        seen[face->prim[1]] += !alone;
+        /* Both of one square; in its plane; u and v from 0 to 1. */
+        assert_true(alone || face->prim[0] / 2 == face->prim[1] / 2);
+        double lo[2] = {9, 9}, hi[2] = {-9, -9};
+        for (int j = 0; j < (alone ? 1 : 2); j++)
+            for (int c = 0; c < 3; c++) {
+                const vec3 p = s.position[3 * face->prim[j] + c];
+                const float *n = face->normal, *row[2] = {face->u_row, face->v_row};
+                assert_near(n[0] * p.x + n[1] * p.y + n[2] * p.z, face->offset, 1e-6);
+                for (int k = 0; k < 2; k++) {
+                    double x =
+                        (double)(row[k][0] * p.x + row[k][1] * p.y + row[k][2] * p.z + row[k][3]);
+                    lo[k] = fmin(lo[k], x);
+                    hi[k] = fmax(hi[k], x);
+                }
+            }
+        for (int k = 0; k < 2; k++) {
+            assert_near(lo[k], 0, 1e-6);
+            assert_near(hi[k], 1, 1e-6);
+        }
+        assert_near(face->per_area, alone ? 0.1 : 1, 1e-6);
+    }
+    for (int i = 0; i < 13; i++)
+        assert_int_equal(seen[i], 1);
     scene_free(&s);
 }
