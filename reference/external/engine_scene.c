@@ -8,6 +8,7 @@
 #include "renderer/base/fs.h"
 #include "renderer/scene/environment.h"
 
+#include <assert.h>
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -66,7 +67,7 @@ static bool make_grey(struct scene *s, int channel, struct err *e)
     for (uint32_t i = 0; i < s->num_materials; i++) {
         struct material *m = &s->materials[i];
         rgb *const colours[] = {&m->reflectance, &m->transmittance, &m->eta, &m->k, &m->radiance};
-        for (size_t k = 0; k < sizeof colours / sizeof *colours; k++)
+        for (int k = 0; k < 5; k++)
             *colours[k] = in_channel(*colours[k], channel);
     }
     for (uint32_t i = 0; i < s->num_lights; i++)
@@ -79,6 +80,7 @@ static bool write_channel(const struct engine *en, const struct suite_scene *sui
 {
     struct scene s = {0};
     struct camera c;
+    assert(en->format != NULL); /* read_channels() sees to it */
     if (!suite_open(suite, &s, &c, e))
         return false;
     bool ok = make_grey(&s, channel, e);
