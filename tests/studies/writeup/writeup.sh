@@ -137,8 +137,8 @@ END
 
 # The box and the bunny, with all light and with direct light alone, as scenes of a suite of their own. Their references are rendered
 # now, so they are small, and the margins are what so few samples can promise: 1 % of the image, of a tile 4 % against Cycles and 6 %
-# against POV-Ray, of which 32 replicates are made. Of images as small as these two may be alike, which it finds and does not judge:
-# so it was with two seeds that were tried before this one.
+# against POV-Ray, of which 32 replicates are made. Two that move the box's edge, which lies along a row of pixels, by the same part
+# of a pixel are found to be alike, and are not judged: so it was with two seeds that were tried before this one.
 scene_of_suite() { # NUMBER NAME FILE DEPTH
     local own=$out/suite/${1}_$2
     sed "s/\"width\": [0-9]*, \"height\": [0-9]*, \"depth\": [0-9]*/\"width\": 64, \"height\": 48, \"depth\": $4/
@@ -220,8 +220,8 @@ END
 Box and bunny, with all light (depth 5) and with direct light alone, 64 x 48 pixels, references rendered for this.
 EQUIVALENT: the same within 1 % of the image and within 4 % (POV-Ray: 6 %) in each 16 x 16 pixels; that any of the eight
 is wrong has a chance of at most 0.1 %. MDB: the smallest error of the image that would have been found 19 times of 20.
-References have seed 1. With two other seeds a scene was not judged against POV-Ray, as two of its images were too alike
-to be independent, which is tested before any verdict.
+References have seed 1. With two other seeds a scene was not judged against POV-Ray: two of its images were too alike, in
+the row of pixels in which the box's edge lies. That is tested before any verdict.
 
 END
     "$build/assay" report --markdown "$out/verdicts/41_box-cycles/results.json" | head -n 2
