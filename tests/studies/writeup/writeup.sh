@@ -220,7 +220,7 @@ END
 Box and bunny, with all light (depth 5) and with direct light alone, 64 x 48 pixels, references rendered for this.
 EQUIVALENT: the same within 1 % of the image and within 4 % (POV-Ray: 6 %) in each 16 x 16 pixels; that any of the eight
 is wrong has a chance of at most 0.1 %. MDB: the smallest error of the image that would have been found 19 times of 20.
-References have seed 1. With two other seeds a scene was not judged against POV-Ray: two of its images were too alike, in
+References have seed 1. With two others a scene was not judged against POV-Ray: two of its images were too alike, in
 the row of pixels in which the box's edge lies. That is tested before any verdict.
 
 END
