@@ -155,7 +155,8 @@ static void table(FILE *f, json_t *const *sorted, size_t num)
         f);
     json_array_foreach(parts, k, p)
     {
-        html_print(f, "<th scope=\"col\" class=\"num\">%s</th>", member_text(p, "number"));
+        html_print(f, "<th scope=\"col\" class=\"num\" title=\"%s\">Part&nbsp;%s</th>",
+                   member_text(p, "title"), member_text(p, "number"));
     }
     fputs("</tr></thead>\n<tbody>\n", f);
     for (size_t i = 0; i < num; i++)
