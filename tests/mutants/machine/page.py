@@ -32,9 +32,9 @@ shows is used to make tests better; sample 2 is for the report alone.
   never; nor are the end-to-end tests. They are built without sanitizers; what none finds is asked once more of the
   quick ones as `make check` builds them.
 - **`assay validate`** finds it if a claim comes out DIFFERENT, or the renderer dies, does not end, or writes what
-  cannot be judged. It judges the scenes that run the line and whose image changes, as among all claims of the suite, on
-  the default instruction set, for at most 25 CPU s. What is undecided by then, INCONCLUSIVE, or without effect on images of 8 samples counts as
-  not found.
+  cannot be judged. It judges the scenes that run the line and whose image changes, as among all claims of the suite,
+  on the default instruction set, for at most 25 CPU s. What is undecided by then, INCONCLUSIVE, or without effect on
+  images of 8 samples counts as not found.
 - It **changes an image** if, with the same seed, the mean of a tile of 16 x 16 pixels changes by more than 1 %, or
   the variance of a sample by more than 10 %, and by more than 5 standard errors, in 20 renders apart from the suite:
   of the assignment's scenes and of scenes made from them ([pool.py](pool.py)).
