@@ -254,6 +254,19 @@ check("a figure's numbers are saved as CSV", download.suggestedFilename() === "t
   csv.length === tiles.length + 2 && Math.abs(csv[1].split(",")[3] - tiles[0]) < 1e-5, csv.slice(0, 2).join(" | "));
 const [plotFile] = await Promise.all([page.waitForEvent("download"), article.locator('a.csv[download="tiles.svg"]').first().click()]);
 const plot = readFileSync(await plotFile.path(), "utf8");
+// In the whole window: looked at closer by the wheel, all of it again, and closed.
+const seen = () => page.evaluate(`document.querySelector("dialog.large svg")?.getAttribute("viewBox")`);
+await article.locator("button.larger").first().click();
+const whole = await seen(), large = await page.locator("dialog.large svg").boundingBox();
+await page.mouse.move(large.x + large.width / 4, large.y + large.height / 4);
+await page.mouse.wheel(0, -100);
+await page.waitForFunction((was) => document.querySelector("dialog.large svg").getAttribute("viewBox") !== was, whole);
+const [x0, y0, w0] = whole.split(/[ ,]+/).map(Number), [x1, , w1] = (await seen()).split(" ").map(Number);
+check("a plot grows to the window, and the wheel looks closer", large.width > 900 && Math.abs(w1 - w0 / 1.2) < 1e-6 * w0 && x1 > x0, whole + " to " + await seen());
+await page.keyboard.press("0");
+check("and shows all again", (await seen()) === [x0, y0, ...whole.split(/[ ,]+/).slice(2).map(Number)].join(" "), await seen());
+await page.keyboard.press("Escape");
+check("and closes", (await page.locator("dialog.large").count()) === 0);
 check("a plot is saved as an SVG that stands alone", plot.startsWith("<svg") && !/var\(|class=|style=/.test(plot) && /<circle[^>]*fill="rgb/.test(plot) &&
   await page.evaluate((text) => new DOMParser().parseFromString(text, "image/svg+xml").querySelector("parsererror") === null, plot), plot.slice(0, 300));
 const bare = await page.evaluate(`[...document.querySelectorAll("figure")].filter((f) => f.querySelector("svg.plot") &&
