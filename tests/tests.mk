@@ -77,7 +77,7 @@ $(1)/tests/test_embree $(1)/tests/bench: TEST_LIBS = -lcmocka $$(LIB_EMBREE)
 endef
 $(foreach b,$(BUILD) $(BUILD)/san $(BUILD)/tsan $(BUILD)/cov,$(eval $(call test_tree,$(b))))
 $(BUILD)/san/pathtracer $(BUILD)/san/assay: $(BUILD)/san/tests/support/asan_options.c.o
-$(call obj,$(BUILD),$(BENCH) $(SUPPORT) tests/support/asan_options.c): | $(BUILD)/deps-test
+$(call obj,$(BUILD),$(TESTS) $(PROGRAMS) $(BENCH) $(SUPPORT) tests/support/asan_options.c tests/end_to_end/no_memory.c): | $(BUILD)/deps-test
 $(BUILD)/tests/bench: $(call obj,$(BUILD),$(BENCH))
 # The peer gets all that this machine has; ours chooses when it starts.
 $(BUILD)/tests/studies/bench/embree_tracer.c.o: CFLAGS += -march=native -ffast-math -ffp-contract=fast
