@@ -243,6 +243,55 @@ TEST(few_rays)
     }
 }
 
+/* The walls of a cube of any size, seen from its centre: direction d meets them at half an edge over the largest |d|. Beyond 1e4 and below
+ * 1e-4 a list has no quick form, and its exact one has to answer. */
+TEST(a_cube_of_any_size)
+{
+    static const float half[] = {1e-5f, 5e-4f, 1, 5e3f, 2e4f, 1e6f};
+    struct err e = {0};
+    for (size_t k = 0; k < sizeof half / sizeof *half; k++) {
+        const float a = half[k], b = 2 * a;
+        struct scene s = build_scene();
+        uint32_t m = build_material(&s, grey(0.5f), grey(0));
+        build_quad(&s, v3(-a, -a, -a), v3(0, b, 0), v3(b, 0, 0), m);
+        build_quad(&s, v3(-a, -a, a), v3(b, 0, 0), v3(0, b, 0), m);
+        build_quad(&s, v3(-a, -a, -a), v3(b, 0, 0), v3(0, 0, b), m);
+        build_quad(&s, v3(-a, a, -a), v3(0, 0, b), v3(b, 0, 0), m);
+        build_quad(&s, v3(-a, -a, -a), v3(0, 0, b), v3(0, b, 0), m);
+        build_quad(&s, v3(a, -a, -a), v3(0, b, 0), v3(0, 0, b), m);
+        MUST(scene_finish(&s, "test", &e));
+        struct bvh *bvh = bvh_build(&s, BVH_WIDE, &e);
+        assert_non_null(bvh);
+        struct bvh_stats stats = {0};
+        for (uint32_t i = 0; i < 100; i++) {
+            struct rays r[2];
+            struct hits h = {0};
+            bool met[2][BATCH_LANES] = {{false}};
+            uint16_t lane[8];
+            float t[8];
+            for (uint16_t l = 0; l < 8; l++) {
+                struct sample4 u = sampler_get(17, 8 * i + l, 0, 0, 0);
+                vec3 d = warp_uniform_sphere(u.u[0], u.u[1]);
+                t[l] = a / maxf(fabsf(d.x), maxf(fabsf(d.y), fabsf(d.z)));
+                rays_set(&r[0], l, (ray){v3(0, 0, 0), d, 0, INFINITY});
+                rays_set(&r[1], l, (ray){v3(0, 0, 0), d, 0, 0.99f * t[l]});
+                r[0].ignore[l] = r[1].ignore[l] = NO_HIT;
+                lane[l] = l;
+            }
+            bvh_closest(bvh, &r[0], lane, 8, &h, &stats);
+            for (int j = 0; j < 2; j++)
+                bvh_occluded(bvh, &r[j], lane, 8, met[j], &stats);
+            for (int l = 0; l < 8; l++) {
+                assert_true(h.prim[l] < 12);
+                assert_near(h.t[l] / t[l], 1, 1e-5);
+                assert_true(met[0][l] && !met[1][l]);
+            }
+        }
+        bvh_free(bvh);
+        scene_free(&s);
+    }
+}
+
 /* A cube of six squares, a triangle and two spheres apart from it. A cube has 8 corners, 12 edges and 6 faces; each square
  * is two triangles of one face, with a diagonal between. */
 TEST(corners_edges_and_faces)

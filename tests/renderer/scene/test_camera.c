@@ -51,6 +51,15 @@ TEST(refuses_what_has_no_rays)
         if (strstr(e.msg, bad[i].why) == NULL)
             fail_msg("'%s' does not say '%s'", e.msg, bad[i].why);
     }
+    /* The largest and the least that are taken. */
+    static const char *const good[] = {"1e9 1e6\n", "1e-6 0\n"};
+    for (size_t i = 0; i < sizeof good / sizeof *good; i++) {
+        char text[512];
+        struct camera c;
+        struct err e = {""};
+        snprintf(text, sizeof text, "%s%s", ANGLES POSITION ORBIT UPRIGHT SCREEN, good[i]);
+        MUST(read_text(text, &c, &e));
+    }
 }
 
 /* A point of the plane in focus is where all rays of its pixel meet: the pixel that sees (sx, sy) of
