@@ -1,7 +1,7 @@
 # What tests the programs, measures them and looks at them. Lines that begin with "#: " are a part of `make help`.
 
 SECONDS_EACH ?= 60
-DEPS_TEST := libcmocka-dev zip ccache clang libclang-rt-dev libxml2-utils libembree-dev patch openimageio-tools chromium \
+DEPS_TEST := libcmocka-dev zip ccache clang libclang-rt-dev libxml2-utils libembree-dev patch cmake openimageio-tools chromium \
   $(DEPS_DEB) locales python3-numpy python3-jsonschema python3-pytest python3-venv python3-pip python3-setuptools python3-wheel \
   $(if $(shell command -v npm),,nodejs npm)
 # Version 4 where it is there, as embree_mesh.h; asked when it has been installed.

@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 """check.py BUILD: what mutate.py, run.py and page.py have to do right, on a small file and on planted mutants. Lines "ok ..." and
 "not ok ..."; 20 CPU seconds."""
+import collections
 import os
 import subprocess
 import sys
@@ -80,12 +81,16 @@ def check_mutator(folder):
     one, two = mutate.sample(everything, 1), mutate.sample(everything, 2)
     say("mutator: two samples share nothing and are all", not {m.id for m in one} & {m.id for m in two} and len(one) + len(two) == len(everything)
         and len({m.id for m in everything}) == len(everything))
-    worst = 0
-    for n in (100, 400, 3000):  # of every beginning, each file has its share
-        for f in {m.file for m in one}:
-            share = sum(m.file == f for m in one) * n / len(one)
-            worst = max(worst, abs(sum(m.file == f for m in one[:n]) - share))
-    say("mutator: beginnings of a sample are stratified", worst <= 1, worst)
+    def stratified(order):
+        """Is there, for every beginning, one share of which each file has its own, to one mutant?"""
+        size = collections.Counter(m.file for m in order)
+        for n in (100, 400, 3000):
+            count = collections.Counter(m.file for m in order[:n])
+            if max((count[f] - 1) / size[f] for f in size) > min((count[f] + 1) / size[f] for f in size):
+                return False
+        return True
+    say("mutator: beginnings of a sample are stratified", stratified(one) and stratified(two))
+    say("mutator: those of another order are not (control)", not stratified(sorted(one, key=lambda m: m.id)))
 
 
 def planted(file, before, after):
