@@ -53,7 +53,7 @@ for suite in $suites; do
         inside "$root" "${run[$step]}" >"$work/$suite.$step.log" 2>&1
         status=$?
         [ $status -eq 0 ] || failed=1
-        echo "| $suite | $step | $([ $status -eq 0 ] && echo yes || echo "**no**, status $status") | $(result "$step" "$work/$suite.$step.log") |" \
+        echo "| $suite | $step | $([ $status -eq 0 ] && echo yes || echo "**no**, status $status") | $(result "$step" "$work/$suite.$step.log" | sed 's/ *$//') |" \
             "$((($(date +%s) - start + 30) / 60)) | $(date -u +%F), $(git rev-parse --short HEAD) |" | tee "$work/$suite.$step.row" >&2
     done
 done
@@ -66,8 +66,8 @@ done
     cat <<'TEXT'
 # On which systems
 
-What is committed, in new minimal roots of Debian 12 (bookworm) and 13 (trixie) in which nothing is but make, git and certificates. `make distros`
-makes this page; do not edit.
+What is committed, in new minimal roots of Debian 12 (bookworm) and 13 (trixie) in which nothing is but make, git and
+certificates. `make distros` makes this page; do not edit.
 
 TEXT
     printf '| system | version | gcc | clang | Blender | Embree |\n|---|---|---|---|---|---|\n%s\n' "$systems"
