@@ -9,6 +9,8 @@
  * NO_MEMORY_MOST of libraries and three times as many of our own code, and none through calls that NO_MEMORY_DONE has from the commands before.
  * NO_MEMORY_FAULT=NAME runs faulty_main() in the program's place, which has to be seen. Clocks stand still. */
 #define _GNU_SOURCE
+#include "tests/support/malloc_below.h"
+
 #include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -27,16 +29,6 @@
 #include <time.h>
 #include <unistd.h>
 #include <unwind.h>
-
-/* Where the memory comes from: AddressSanitizer if it is there, so that it sees every block as ever, else the C library. */
-#define UNDER(type, name, ...)                                                                     \
-    extern type __interceptor_##name(__VA_ARGS__) __attribute__((weak));                           \
-    extern type __libc_##name(__VA_ARGS__);
-UNDER(void *, malloc, size_t)
-UNDER(void *, calloc, size_t, size_t)
-UNDER(void *, realloc, void *, size_t)
-UNDER(void *, memalign, size_t, size_t)
-#define BELOW(name) (__interceptor_##name != NULL ? __interceptor_##name : __libc_##name)
 
 enum {
     MAX_ALLOCATIONS = 1 << 20,
@@ -116,15 +108,15 @@ static bool fails(void)
 
 void *malloc(size_t size)
 {
-    return fails() ? NULL : BELOW(malloc)(size);
+    return fails() ? NULL : MALLOC_BELOW(malloc)(size);
 }
 void *calloc(size_t n, size_t size)
 {
-    return fails() ? NULL : BELOW(calloc)(n, size);
+    return fails() ? NULL : MALLOC_BELOW(calloc)(n, size);
 }
 void *realloc(void *p, size_t size)
 {
-    return fails() ? NULL : BELOW(realloc)(p, size);
+    return fails() ? NULL : MALLOC_BELOW(realloc)(p, size);
 }
 void *reallocarray(void *p, size_t n, size_t size)
 {
@@ -137,7 +129,7 @@ void *reallocarray(void *p, size_t n, size_t size)
 }
 void *memalign(size_t alignment, size_t size)
 {
-    return fails() ? NULL : BELOW(memalign)(alignment, size);
+    return fails() ? NULL : MALLOC_BELOW(memalign)(alignment, size);
 }
 void *aligned_alloc(size_t alignment, size_t size)
 {

@@ -114,18 +114,26 @@ static enum approval approve_incomparable(const struct approve_options *opt,
                          out);
 }
 
+/* With the margins of the suite. */
+static bool compare(const struct approve_options *opt, const struct suite_scene *scene,
+                    const struct suite_reference *ref, const struct moments *candidate,
+                    const struct moments *stored, struct comparison *out, struct err *e)
+{
+    const struct compare_options co = {.alpha = opt->alpha,
+                                       .margin_global = ref->margin_global,
+                                       .margin_tile = ref->margin_tile,
+                                       .tile = scene->tile};
+    return compare_moments(candidate, stored, &co, out, e);
+}
+
 static enum approval approve_compared(const struct approve_options *opt,
                                       const struct suite_scene *scene,
                                       const struct suite_reference *ref,
                                       const struct golden *candidate, const struct golden *stored,
                                       FILE *out, struct err *e)
 {
-    const struct compare_options co = {.alpha = opt->alpha,
-                                       .margin_global = ref->margin_global,
-                                       .margin_tile = ref->margin_tile,
-                                       .tile = scene->tile};
     struct comparison r;
-    if (!compare_moments(&candidate->m, &stored->m, &co, &r, e)) {
+    if (!compare(opt, scene, ref, &candidate->m, &stored->m, &r, e)) {
         err_prefix(e, "%s/%s: candidate (A) against stored (B)", scene->name, ref->engine);
         return APPROVE_IMPOSSIBLE;
     }
@@ -230,13 +238,9 @@ bool approve_compare(const struct approve_options *opt, const struct suite_scene
     struct comparison r = {0};
     golden_inspect(opt->from_dir, scene, ref, &candidate);
     golden_inspect(opt->golden_dir, scene, ref, &stored);
-    const struct compare_options co = {.alpha = opt->alpha,
-                                       .margin_global = ref->margin_global,
-                                       .margin_tile = ref->margin_tile,
-                                       .tile = scene->tile};
     bool ok = can_compare(&candidate, opt->from_dir, e) && can_compare(&stored, opt->golden_dir, e);
     bool same = ok && same_moments(&candidate.m, &stored.m);
-    ok = ok && (same || compare_moments(&candidate.m, &stored.m, &co, &r, e));
+    ok = ok && (same || compare(opt, scene, ref, &candidate.m, &stored.m, &r, e));
     if (ok) {
         const struct region *g = &r.global[3];
         char effect[64] = "the same bits";

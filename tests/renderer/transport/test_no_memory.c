@@ -9,22 +9,12 @@
 #include "renderer/shading/scene_simd.h"
 #include "renderer/transport/render.h"
 #include "tests/support/build_scene.h"
+#include "tests/support/malloc_below.h"
 #include "tests/support/mesh.h"
 #include "tests/support/test.h"
 
 #include <pthread.h>
 #include <stdatomic.h>
-
-/* This program's malloc() and kin, over AddressSanitizer's if it is there, else the C library's. */
-#define UNDER(type, name, ...)                                                                     \
-    extern type __interceptor_##name(__VA_ARGS__) __attribute__((weak));                           \
-    extern type __libc_##name(__VA_ARGS__);
-UNDER(void *, malloc, size_t)
-UNDER(void *, calloc, size_t, size_t)
-UNDER(void *, realloc, void *, size_t)
-UNDER(void *, memalign, size_t, size_t)
-UNDER(void, free, void *)
-#define BELOW(name) (__interceptor_##name != NULL ? __interceptor_##name : __libc_##name)
 
 extern const char __executable_start, etext;
 
@@ -82,12 +72,12 @@ static BARE void let_go(const void *p)
 BARE void *malloc(size_t size)
 {
     bool own = is_own(__builtin_return_address(0));
-    return fails(own) ? NULL : keep(own, BELOW(malloc)(size));
+    return fails(own) ? NULL : keep(own, MALLOC_BELOW(malloc)(size));
 }
 BARE void *calloc(size_t n, size_t size)
 {
     bool own = is_own(__builtin_return_address(0));
-    return fails(own) ? NULL : keep(own, BELOW(calloc)(n, size));
+    return fails(own) ? NULL : keep(own, MALLOC_BELOW(calloc)(n, size));
 }
 BARE void *realloc(void *p, size_t size)
 {
@@ -95,17 +85,17 @@ BARE void *realloc(void *p, size_t size)
     if (fails(own))
         return NULL;
     let_go(p);
-    return keep(own, BELOW(realloc)(p, size));
+    return keep(own, MALLOC_BELOW(realloc)(p, size));
 }
 BARE void *aligned_alloc(size_t alignment, size_t size)
 {
     bool own = is_own(__builtin_return_address(0));
-    return fails(own) ? NULL : keep(own, BELOW(memalign)(alignment, size));
+    return fails(own) ? NULL : keep(own, MALLOC_BELOW(memalign)(alignment, size));
 }
 BARE void free(void *p)
 {
     let_go(p);
-    BELOW(free)(p);
+    MALLOC_BELOW(free)(p);
 }
 
 /* What is tried; on success *digest tells whether it is the same. */
