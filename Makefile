@@ -31,7 +31,7 @@ WARN      = -Wall -Wextra $(if $(WERROR),-Werror)
 WARN_C    = $(WARN) -Wshadow -Wstrict-prototypes -Wswitch-enum -Wvla
 # -ffp-contract=off: the same bits whether or not a processor can multiply and add in one step.
 cflags    = -std=c17 $(OPT) -ffp-contract=off $(WARN_C) -D_XOPEN_SOURCE=700 -pthread $(CFLAGS) -I. $(pkg_cflags)
-# OpenImageIO is in oiio.so alone (reference/base/image_oiio.h).
+# OpenImageIO is in oiio.so alone (renderer/image/image_oiio.h).
 cxxflags  = -std=c++17 -fPIC $(OPT) $(WARN) $(CXXFLAGS) -I. $(shell pkg-config --cflags OpenImageIO | sed 's/-I/-isystem /g')
 
 # Compiled once for each instruction set (renderer/base/isa.h), renderer/bvh/traverse_avx2.c.o say, and for one lane.
@@ -173,7 +173,7 @@ $(1)/pathtracer: $(1)/renderer/pathtracer/pathtracer.c.o $(1)/libassay.a
 	$$(link)
 $(1)/assay: $(1)/tools/commands/assay.c.o $(1)/libassay.a
 	$$(link)
-$(1)/oiio.so: $(1)/reference/base/oiio.cc.o
+$(1)/oiio.so: $(1)/renderer/image/oiio.cc.o
 	$$(call say,LINK,$$@)
 	$$(Q)$$(CXX) $$(OPT) -shared -o $$@ $$< $$(shell pkg-config --libs OpenImageIO)
 # What the compiler's dependency files cannot know: the page's parts are read by the assembler, and

@@ -7,7 +7,7 @@
 #include "reference/replicates/replicate_images.h"
 #include "reference/base/process.h"
 
-#include "reference/base/image_oiio.h"
+#include "renderer/image/image_oiio.h"
 #include "renderer/base/fs.h"
 #include "renderer/base/progress.h"
 

@@ -1,5 +1,5 @@
-/* Image files: OpenEXR, PNG and Radiance's, by libraries that load in a moment. Images of other kinds,
- * which only the harness reads: image_oiio.h. Pixels are float32, interleaved, row 0 at the top. */
+/* Image files: OpenEXR, PNG and Radiance's, by libraries that load in a moment. Images of other kinds:
+ * image_oiio.h. Pixels are float32, interleaved, row 0 at the top. */
 #ifndef ASSAY_IMAGE_H
 #define ASSAY_IMAGE_H
 

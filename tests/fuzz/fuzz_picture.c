@@ -1,5 +1,5 @@
 /* Images from elsewhere: whatever `assay compare` might be given, by way of OpenImageIO; HDR skies by our reader. */
-#include "reference/base/image_oiio.h"
+#include "renderer/image/image_oiio.h"
 #include "fuzz.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)

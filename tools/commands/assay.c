@@ -1,6 +1,6 @@
 /* assay: one program, several verbs. */
 #include "reference/base/gsl_errors.h"
-#include "reference/base/image_oiio.h"
+#include "renderer/image/image_oiio.h"
 #include "renderer/image/image.h"
 #include "renderer/base/cli.h"
 #include "renderer/base/version.h"

@@ -1,7 +1,7 @@
 #include "grade_options.h"
 
 #include "renderer/base/cli.h"
-#include "reference/base/image_oiio.h"
+#include "renderer/image/image_oiio.h"
 #include "reference/base/process.h"
 #include "renderer/base/fs.h"
 #include "tools/results/results.h"

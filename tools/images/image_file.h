@@ -3,7 +3,7 @@
 #ifndef ASSAY_IMAGE_FILE_H
 #define ASSAY_IMAGE_FILE_H
 
-#include "reference/base/image_oiio.h"
+#include "renderer/image/image_oiio.h"
 
 struct image_file {
     int width, height;

@@ -2,7 +2,7 @@
 #ifndef ASSAY_INPUT_INTERNAL_H
 #define ASSAY_INPUT_INTERNAL_H
 
-#include "reference/base/image_oiio.h"
+#include "renderer/image/image_oiio.h"
 #include "input.h"
 
 /* Tells where the file holds another rectangle than the image. */

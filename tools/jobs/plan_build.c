@@ -1,6 +1,6 @@
 #include "plan.h"
 
-#include "reference/base/image_oiio.h"
+#include "renderer/image/image_oiio.h"
 #include "renderer/base/fs.h"
 #include "renderer/base/sha256.h"
 #include "renderer/base/version.h"

@@ -3,7 +3,7 @@
 #include "tests/support/sky.h"
 
 #include "reference/cycles/export_cycles.h"
-#include "reference/base/image_oiio.h"
+#include "renderer/image/image_oiio.h"
 #include "tests/support/test.h"
 
 #include <sys/stat.h>

@@ -4,7 +4,7 @@
 #include "tests/support/build_scene.h"
 
 #include "reference/mitsuba/export_mitsuba.h"
-#include "reference/base/image_oiio.h"
+#include "renderer/image/image_oiio.h"
 #include "renderer/scene/environment.h"
 #include "tests/support/test.h"
 

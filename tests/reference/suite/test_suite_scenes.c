@@ -6,7 +6,7 @@
 #include "reference/suite/suite.h"
 #include "tests/support/render_check.h"
 #include "tests/support/suite_files.h"
-#include "reference/base/image_oiio.h"
+#include "renderer/image/image_oiio.h"
 #include "tests/support/test.h"
 #include "tests/support/vectors.h"
 

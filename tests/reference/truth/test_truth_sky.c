@@ -5,7 +5,7 @@
 #include "reference/truth/truth_sky.h"
 #include "reference/truth/truth_pixel_mean.h"
 #include "tests/support/optics.h"
-#include "reference/base/image_oiio.h"
+#include "renderer/image/image_oiio.h"
 #include "tests/support/quadrature.h"
 #include "tests/support/suite_files.h"
 #include "tests/support/test.h"

@@ -1,7 +1,7 @@
 /* Our readers and writers of image files against OpenImageIO's, a route of its own: the same bits of
  * every channel, whichever way OpenEXR and RGBE pack them; and files that are cut short or damaged. */
 #include "renderer/base/fs.h"
-#include "reference/base/image_oiio.h"
+#include "renderer/image/image_oiio.h"
 #include "renderer/math/sampler.h"
 #include "reference/base/process.h"
 #include "tests/support/test.h"

@@ -1,6 +1,6 @@
 /* What stands in the files that a render leaves, and what is said of it. Tone curves by hand: sRGB is 12.92 x up to 0.0031308, else
  * 1.055 x^(1/2.4) - 0.055, times 255, rounded; the assignment's (sqrt(2) x)^(1/2.2) times 255, cut off. */
-#include "reference/base/image_oiio.h"
+#include "renderer/image/image_oiio.h"
 #include "renderer/image/tone.h"
 #include "renderer/pathtracer/output.h"
 #include "tests/support/test.h"

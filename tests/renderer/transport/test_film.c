@@ -1,5 +1,5 @@
 /* Stopping and going on, adaptive sampling, layers. */
-#include "reference/base/image_oiio.h"
+#include "renderer/image/image_oiio.h"
 #include "renderer/pathtracer/heatmap.h"
 #include "renderer/pathtracer/output.h"
 #include "renderer/pathtracer/checkpoint.h"

@@ -4,7 +4,7 @@
 #include "anchors.h"
 
 #include "reference/base/process.h"
-#include "reference/base/image_oiio.h"
+#include "renderer/image/image_oiio.h"
 #include "renderer/base/fs.h"
 #include "tests/support/rates.h"
 #include "tests/support/simulate.h"

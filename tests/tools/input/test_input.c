@@ -3,7 +3,7 @@
 #include "odd_images.h"
 #include "tests/support/simulate.h"
 
-#include "reference/base/image_oiio.h"
+#include "renderer/image/image_oiio.h"
 #include "renderer/base/fs.h"
 #include "tools/images/tone_curve.h"
 #include "tools/input/input.h"

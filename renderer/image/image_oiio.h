@@ -3,8 +3,8 @@
 #ifndef ASSAY_IMAGE_OIIO_H
 #define ASSAY_IMAGE_OIIO_H
 
+#include "image.h"
 #include "renderer/base/fs.h"
-#include "renderer/image/image.h"
 
 /* Reads OpenEXR, Radiance, PNG, PFM and PNM, told by their first bytes. Integer formats come scaled to [0,1], no
  * colour conversion. Of OpenEXR it is the data window. Refuses, unread, what is larger than the limits of image.h. *half (may be NULL) tells if the file stored fewer than 32 bits per channel. */

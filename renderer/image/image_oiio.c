@@ -1,8 +1,8 @@
 #include "image_oiio.h"
 
-#include "renderer/image/exr_header.h"
-#include "renderer/base/fs.h"
+#include "exr_header.h"
 #include "oiio.h"
+#include "renderer/base/fs.h"
 
 #include <ctype.h>
 #include <dlfcn.h>
