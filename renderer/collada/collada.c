@@ -125,7 +125,7 @@ static const char *name_of(const xmlNode *node)
 
 static bool instance_geometry(struct loader *ld, const xmlNode *instance, const struct place *at)
 {
-    xmlNode *geometry;
+    const xmlNode *geometry;
     const struct mesh *mesh;
     double sign;
     uint32_t material;
@@ -158,7 +158,7 @@ static bool walk(struct loader *ld, const xmlNode *node, const struct place *abo
 
 static bool instance_node(struct loader *ld, const xmlNode *instance, const struct place *at)
 {
-    xmlNode *node;
+    const xmlNode *node;
     if (!element_only_children(ld, instance, "extra") ||
         !element_follow(ld, instance, "url", "node", &node))
         return false;
@@ -171,7 +171,7 @@ static bool instance_node(struct loader *ld, const xmlNode *instance, const stru
 
 static bool read_content(struct loader *ld, const xmlNode *c, const struct place *at)
 {
-    xmlNode *target;
+    const xmlNode *target;
     if (element_is(c, "node"))
         return walk(ld, c, at);
     if (element_is(c, "instance_node"))
@@ -248,7 +248,7 @@ static bool check_libraries(struct loader *ld, const xmlNode *root)
     return true;
 }
 
-static bool find_visual_scene(struct loader *ld, const xmlNode *root, xmlNode **out)
+static bool find_visual_scene(struct loader *ld, const xmlNode *root, const xmlNode **out)
 {
     xmlNode *scene, *instance;
     if (!element_one_child(ld, root, "scene", &scene))
@@ -267,7 +267,7 @@ static bool find_visual_scene(struct loader *ld, const xmlNode *root, xmlNode **
 static bool read_scene(struct loader *ld)
 {
     const xmlNode *root = xmlDocGetRootElement(ld->doc);
-    xmlNode *visual;
+    const xmlNode *visual;
     mat4 axes;
     if (!check_libraries(ld, root) || !read_asset(ld, root, &axes) ||
         !find_visual_scene(ld, root, &visual) ||

@@ -151,29 +151,35 @@ int element_compare_ids(const void *a, const void *b)
     return strcmp(x->id, y->id);
 }
 
+bool element_by_id(struct loader *ld, const xmlNode *n, const char *id, const char *element,
+                   const xmlNode **out)
+{
+    struct id_entry key = {id, NULL};
+    const struct id_entry *hit =
+        ld->num_ids > 0 ? bsearch(&key, ld->ids, ld->num_ids, sizeof key, element_compare_ids)
+                        : NULL;
+    if (hit == NULL)
+        return fail_at(ld, n, "no element with id '%.200s'", id);
+    const struct id_entry *end = ld->ids + ld->num_ids;
+    if ((hit > ld->ids && element_compare_ids(hit - 1, hit) == 0) ||
+        (hit + 1 < end && element_compare_ids(hit + 1, hit) == 0))
+        return fail_at(ld, n, "more than one element has id '%.200s'", id);
+    if (!element_is(hit->node, element))
+        return fail_at(ld, n, "'%.200s' is a <%.60s>, not a <%s>", id,
+                       (const char *)hit->node->name, element);
+    *out = hit->node;
+    return true;
+}
+
 bool element_follow(struct loader *ld, const xmlNode *n, const char *name, const char *element,
-                    xmlNode **out)
+                    const xmlNode **out)
 {
     const char *url = element_attribute(n, name);
     if (url == NULL)
         return fail_at(ld, n, "<%.60s> without attribute '%s'", (const char *)n->name, name);
     if (url[0] != '#')
         return fail_at(ld, n, "reference '%.200s' leads out of the file: not supported", url);
-    struct id_entry key = {url + 1, NULL};
-    const struct id_entry *hit =
-        ld->num_ids > 0 ? bsearch(&key, ld->ids, ld->num_ids, sizeof key, element_compare_ids)
-                        : NULL;
-    if (hit == NULL)
-        return fail_at(ld, n, "no element with id '%.200s'", url + 1);
-    const struct id_entry *end = ld->ids + ld->num_ids;
-    if ((hit > ld->ids && element_compare_ids(hit - 1, hit) == 0) ||
-        (hit + 1 < end && element_compare_ids(hit + 1, hit) == 0))
-        return fail_at(ld, n, "more than one element has id '%.200s'", url + 1);
-    if (!element_is(hit->node, element))
-        return fail_at(ld, n, "'%.200s' is a <%.60s>, not a <%s>", url,
-                       (const char *)hit->node->name, element);
-    *out = hit->node;
-    return true;
+    return element_by_id(ld, n, url + 1, element, out);
 }
 
 bool element_is_own_profile(const char *profile)

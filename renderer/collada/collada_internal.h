@@ -74,6 +74,7 @@ struct loader {
     enum dialect dialect;
     bool is_course_export; /* taken for a file of the assignment by the program that wrote it */
     unsigned num_specular; /* materials in use whose highlight the dialect leaves out */
+    const xmlNode *instance_effect; /* of the material that is being read */
     xmlDoc *doc;
     struct id_entry *ids; /* sorted by id */
     size_t num_ids;
@@ -139,9 +140,12 @@ bool element_attribute_count(struct loader *ld, const xmlNode *n, const char *na
 /* The same with a default. */
 bool element_attribute_count_or(struct loader *ld, const xmlNode *n, const char *name,
                                 uint64_t missing, uint64_t *out);
+/* The element of that id; it must be called `element`. `n` is who to blame. */
+bool element_by_id(struct loader *ld, const xmlNode *n, const char *id, const char *element,
+                   const xmlNode **out);
 /* The element that attribute `name` ("#id") points to; it must be called `element`. */
 bool element_follow(struct loader *ld, const xmlNode *n, const char *name, const char *element,
-                    xmlNode **out);
+                    const xmlNode **out);
 /* Orders ids by name, for qsort() and bsearch(). */
 int element_compare_ids(const void *a, const void *b);
 /* Is it "ASSAY" or "CGL"? */
@@ -164,6 +168,21 @@ bool text_read_up_to(struct loader *ld, const xmlNode *n, double *out, size_t mo
 bool text_read_color(struct loader *ld, const xmlNode *n, rgb *out, double *alpha);
 /* The element's text without blanks around it; the caller frees. NULL: failed. */
 char *text_read_word(struct loader *ld, const xmlNode *n);
+
+/* collada_parameter.c */
+
+/* The value (<float4>, <sampler2D>, ...) of the parameter `sid` for an element of an effect: what
+ * the <instance_effect> sets, else what the <newparam> nearest above says. It must be one of the
+ * kinds, separated by blanks. */
+bool parameter_get(struct loader *ld, const xmlNode *user, const char *sid, const char *kinds,
+                   const xmlNode **value);
+/* What a <texture> leads to; all live in the document. */
+struct texture_use {
+    const xmlNode *sampler; /* <sampler2D>: wrap_s, wrap_t, magfilter, ...; NULL if there is none */
+    const xmlNode *image;
+    const char *texcoord; /* the semantic that <bind_vertex_input> gives a set; NULL if absent */
+};
+bool parameter_get_texture(struct loader *ld, const xmlNode *texture, struct texture_use *out);
 
 /* collada_extra.c */
 

@@ -3,45 +3,46 @@
 
 #include <string.h>
 
-/* One channel of a shader: a colour, or false with a line for a texture or a parameter. A missing
- * element leaves *value and *alpha as they are. */
+/* What a channel of a shader says, itself (by the element `own`) or by a parameter of one of those
+ * kinds; a line for a texture. *value NULL: nothing. */
+static bool find_value(struct loader *ld, const xmlNode *shader, const char *name, const char *own,
+                       const char *kinds, const xmlNode **value)
+{
+    xmlNode *channel;
+    struct texture_use texture;
+    *value = NULL;
+    if (!element_one_child(ld, shader, name, &channel) || channel == NULL)
+        return channel == NULL;
+    *value = element_first_child(channel);
+    if (*value == NULL)
+        return fail_at(ld, channel, "<%s> without <%s>", name, own);
+    if (element_next_sibling(*value) != NULL)
+        return element_fail_unexpected(ld, element_next_sibling(*value));
+    if (element_is(*value, "param"))
+        return parameter_get(ld, *value, element_attribute(*value, "ref"), kinds, value);
+    if (element_is(*value, "texture") && strcmp(own, "color") == 0)
+        return parameter_get_texture(ld, *value, &texture) &&
+               fail_at(ld, *value, "<%s> by <texture> is not supported%s", name,
+                       ld->dialect == DIALECT_COLLADA && strcmp(name, "diffuse") != 0
+                           ? " (--dialect cgl ignores it)"
+                           : "");
+    return element_is(*value, own) || element_fail_unexpected(ld, *value);
+}
+
+/* One channel of a shader: a missing element leaves *value and *alpha as they are. */
 static bool read_channel(struct loader *ld, const xmlNode *shader, const char *name, rgb *value,
                          double *alpha)
 {
-    xmlNode *channel, *color;
-    if (!element_one_child(ld, shader, name, &channel))
-        return false;
-    if (channel == NULL)
-        return true;
-    for (const xmlNode *c = element_first_child(channel); c != NULL; c = element_next_sibling(c)) {
-        if (element_is_one_of(c, "texture param"))
-            return fail_at(ld, c, "<%s> by <%s> is not supported%s", name, (const char *)c->name,
-                           ld->dialect == DIALECT_COLLADA && strcmp(name, "diffuse") != 0
-                               ? " (--dialect cgl ignores it)"
-                               : "");
-        if (!element_is(c, "color"))
-            return element_fail_unexpected(ld, c);
-    }
-    if (!element_one_child(ld, channel, "color", &color))
-        return false;
-    if (color == NULL)
-        return fail_at(ld, channel, "<%s> without <color>", name);
-    return text_read_color(ld, color, value, alpha);
+    const xmlNode *color;
+    return find_value(ld, shader, name, "color", "float3 float4", &color) &&
+           (color == NULL || text_read_color(ld, color, value, alpha));
 }
 
 static bool read_factor(struct loader *ld, const xmlNode *shader, const char *name, double *value)
 {
-    xmlNode *factor, *number;
-    if (!element_one_child(ld, shader, name, &factor))
-        return false;
-    if (factor == NULL)
-        return true;
-    if (!element_only_children(ld, factor, "float") ||
-        !element_one_child(ld, factor, "float", &number))
-        return false;
-    if (number == NULL)
-        return fail_at(ld, factor, "<%s> without <float>", name);
-    return text_read_exactly(ld, number, value, 1);
+    const xmlNode *number;
+    return find_value(ld, shader, name, "float", "float", &number) &&
+           (number == NULL || text_read_exactly(ld, number, value, 1));
 }
 
 /* COLLADA 1.5 "Determining Transparency (Opacity)". */
@@ -173,16 +174,18 @@ static bool read_effect(struct loader *ld, const xmlNode *effect, struct materia
 
 static bool read_material(struct loader *ld, const xmlNode *material, struct material *m)
 {
-    xmlNode *instance, *effect;
+    xmlNode *instance;
+    const xmlNode *effect;
     if (!element_only_children(ld, material, "asset instance_effect extra") ||
         !element_one_child(ld, material, "instance_effect", &instance))
         return false;
     if (instance == NULL)
         return fail_at(ld, material, "<material> without <instance_effect>");
-    if (!element_only_children(ld, instance, "technique_hint extra") ||
+    if (!element_only_children(ld, instance, "technique_hint setparam extra") ||
         !element_follow(ld, instance, "url", "effect", &effect))
         return false;
     const char *name = element_attribute(material, "name"), *id = element_attribute(material, "id");
+    ld->instance_effect = instance;
     build_copy_name(m->name, sizeof m->name, name != NULL ? name : id != NULL ? id : "material");
     return read_effect(ld, effect, m);
 }
@@ -228,7 +231,8 @@ static bool find_bindings(struct loader *ld, const xmlNode *instance, xmlNode **
 bool material_get(struct loader *ld, const xmlNode *instance, const xmlNode *user,
                   const char *symbol, uint32_t *index)
 {
-    xmlNode *common, *material = NULL;
+    xmlNode *common;
+    const xmlNode *material = NULL;
     if (!find_bindings(ld, instance, &common))
         return false;
     const xmlNode *first = common != NULL ? element_first_child(common) : NULL, *match = NULL;

@@ -46,7 +46,7 @@ static bool read_source(struct loader *ld, const xmlNode *node, struct source *o
     if (accessor == NULL)
         return fail_at(ld, node, "<source> without an <accessor>");
     uint64_t count, stride, offset, declared, param[3];
-    xmlNode *array;
+    const xmlNode *array;
     if (!element_attribute_count(ld, accessor, "count", &count) ||
         !element_attribute_count_or(ld, accessor, "stride", 1, &stride) ||
         !element_attribute_count_or(ld, accessor, "offset", 0, &offset) ||
@@ -84,7 +84,7 @@ done:
 
 static bool get_source(struct loader *ld, struct sources *all, const xmlNode *input, long *index)
 {
-    xmlNode *node;
+    const xmlNode *node;
     if (!element_follow(ld, input, "source", "source", &node))
         return false;
     for (size_t i = 0; i < all->count; i++) {
@@ -178,7 +178,7 @@ bool source_read_inputs(struct loader *ld, struct sources *all, const xmlNode *p
             return fail_at(ld, c, "<input> offset above 255");
         in->stride = offset + 1 > in->stride ? offset + 1 : in->stride;
         if (strcmp(semantic, "VERTEX") == 0) {
-            xmlNode *vertices;
+            const xmlNode *vertices;
             if (has_vertex)
                 return fail_at(ld, c, "a second <input> of semantic 'VERTEX'");
             if (!element_follow(ld, c, "source", "vertices", &vertices) ||

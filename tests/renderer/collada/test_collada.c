@@ -324,7 +324,7 @@ TEST(geometry)
 }
 TEST(materials)
 {
-    run_file("tests/renderer/collada/look.cases", 40);
+    run_file("tests/renderer/collada/look.cases", 45);
 }
 TEST(lights_and_cameras)
 {
@@ -332,7 +332,7 @@ TEST(lights_and_cameras)
 }
 TEST(refused)
 {
-    run_file("tests/renderer/collada/refused.cases", 54);
+    run_file("tests/renderer/collada/refused.cases", 66);
 }
 
 TEST(microfacet_of_ours)
