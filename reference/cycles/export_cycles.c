@@ -64,7 +64,8 @@ bool export_cycles(const struct scene *s, const struct camera *c, int depth, con
     if (strlen(path) >= sizeof image - 4)
         return err_set(e, "%.64s...: path too long", path);
     snprintf(image, sizeof image, "%s.exr", path);
-    bool ok = (materials = cycles_materials(s, &why)) != NULL &&
+    bool ok = features_check_textures("Cycles", s, &why) &&
+              (materials = cycles_materials(s, &why)) != NULL &&
               (camera = camera_json(s, c, &why)) != NULL &&
               (meshes = cycles_meshes(s, &why)) != NULL &&
               (environment = cycles_environment(s, image, &image_written, &why)) != NULL;

@@ -247,8 +247,9 @@ bool povray_passes(const struct scene *s, const struct camera *c, int depth,
         if (!check_material(&s->materials[i], e))
             return false;
     count_materials(s, &n);
-    if (!features_check_normals("POV-Ray", s, e) || !check_camera(s, c, p.extent, e) ||
-        !povray_check_glass(s, c, p.extent, e) || !plan_lights(s, &p, &n, e))
+    if (!features_check_normals("POV-Ray", s, e) || !features_check_textures("POV-Ray", s, e) ||
+        !check_camera(s, c, p.extent, e) || !povray_check_glass(s, c, p.extent, e) ||
+        !plan_lights(s, &p, &n, e))
         return false;
     plan_passes(s, &n, depth, &p);
     if (!check_depth(&p, &n, depth, e))

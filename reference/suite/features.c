@@ -26,6 +26,7 @@ const char *const feature_names[NUM_FEATURES + 1] = {
     [FEATURE_SMOOTH] = "smooth",
     [FEATURE_LENS] = "lens",
     [FEATURE_CLIP] = "clip",
+    [FEATURE_TEXTURE] = "texture",
 };
 
 static dvec3 wide(vec3 v)
@@ -110,6 +111,8 @@ static unsigned material_features(const struct material *m)
     }
     if (!rgb_is_zero(m->radiance))
         f |= 1u << (m->radiance_both_sides ? FEATURE_TWO_SIDED : FEATURE_AREA);
+    if (m->reflectance_map != 0 || m->radiance_map != 0)
+        f |= 1u << FEATURE_TEXTURE;
     return f;
 }
 
@@ -259,8 +262,18 @@ bool features_check_normals(const char *engine, const struct scene *s, struct er
     return true;
 }
 
+bool features_check_textures(const char *engine, const struct scene *s, struct err *e)
+{
+    for (uint32_t i = 0; i < s->num_materials; i++)
+        if (s->materials[i].reflectance_map != 0 || s->materials[i].radiance_map != 0)
+            return err_set(e, "%s: the texture of material '%s' cannot be expressed", engine,
+                           s->materials[i].name);
+    return true;
+}
+
 bool features_check_exportable(const char *engine, const struct scene *s, const struct camera *c,
                                struct err *e)
 {
-    return features_check_camera(engine, s, c, e) && features_check_normals(engine, s, e);
+    return features_check_camera(engine, s, c, e) && features_check_normals(engine, s, e) &&
+           features_check_textures(engine, s, e);
 }

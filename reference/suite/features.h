@@ -21,9 +21,10 @@ enum feature {
     FEATURE_DIRECTIONAL, /* light from one direction */
     FEATURE_ENVIRONMENT, /* light from all directions */
     FEATURE_SPHERE,
-    FEATURE_SMOOTH, /* shading normals that are not the geometric ones */
-    FEATURE_LENS,   /* thin lens */
-    FEATURE_CLIP,   /* a near or far plane that may cut something off */
+    FEATURE_SMOOTH,  /* shading normals that are not the geometric ones */
+    FEATURE_LENS,    /* thin lens */
+    FEATURE_CLIP,    /* a near or far plane that may cut something off */
+    FEATURE_TEXTURE, /* images on surfaces */
     NUM_FEATURES
 };
 
@@ -60,7 +61,10 @@ bool features_check_camera(const char *engine, const struct scene *s, const stru
 /* Where a shading normal of a vertex is on the back of its triangle. */
 bool features_check_normals(const char *engine, const struct scene *s, struct err *e)
     __attribute__((warn_unused_result));
-/* Camera and normals. */
+/* Where a material has a texture. */
+bool features_check_textures(const char *engine, const struct scene *s, struct err *e)
+    __attribute__((warn_unused_result));
+/* Camera, normals and textures. */
 bool features_check_exportable(const char *engine, const struct scene *s, const struct camera *c,
                                struct err *e) __attribute__((warn_unused_result));
 

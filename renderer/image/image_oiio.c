@@ -10,6 +10,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
+#include <strings.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #include <zlib.h>
@@ -81,10 +82,16 @@ static bool inflates_within(z_stream *z, FILE *f, long length, double *left)
     return *left >= 0; /* what is damaged the library will say */
 }
 
+/* What a file is read for. */
+enum use { FOR_HEAD, FOR_PIXELS, FOR_COLOURS };
+
+/* How stored numbers become linear: the power of them, or sRGB's curve. */
+#define SRGB 0.0
+
 /* Why a PNG is not to be read, or NULL. The library reserves what a chunk says it is long, up to 2 GiB, before it looks [PNG 5.3], and
  * inflates all that a stream holds, a thousandfold of the file, though the pixels are known to be fewer. pixels: they are to be read; how many there are may be wrong for the
  * caller, who is told at no cost. f: after the signature. */
-static const char *png_refusal(FILE *f, long size, bool pixels)
+static const char *png_refusal(FILE *f, long size, bool pixels, double *power)
 {
     enum { AROUND = 12 /* length, name, checksum */, TEXTS = 1 << 18 };
     unsigned char head[8 + 13];
@@ -92,6 +99,8 @@ static const char *png_refusal(FILE *f, long size, bool pixels)
     long texts = 0;
     z_stream z = {0};
     const char *why = NULL;
+    bool profile = false;
+    *power = SRGB;
     if (inflateInit(&z) != Z_OK)
         return "out of memory";
     for (long at = 8; why == NULL && at <= size - AROUND;) {
@@ -102,6 +111,10 @@ static const char *png_refusal(FILE *f, long size, bool pixels)
         else if (memcmp(head + 4, "IHDR", 4) == 0 && length == 13 &&
                  fread(head + 8, 1, 13, f) == 13)
             left = png_bytes(head + 8);
+        else if (memcmp(head + 4, "sRGB", 4) == 0 || memcmp(head + 4, "iCCP", 4) == 0)
+            profile = true; /* and wins over gAMA [PNG 11.3.3] */
+        else if (memcmp(head + 4, "gAMA", 4) == 0 && length == 4 && fread(head + 8, 1, 4, f) == 4)
+            *power = 1e5 / fmax(1, (double)big_endian(head + 8));
         else if (pixels && memcmp(head + 4, "IDAT", 4) == 0 &&
                  !inflates_within(&z, f, length, &left))
             why = "its data are more than its pixels";
@@ -111,11 +124,20 @@ static const char *png_refusal(FILE *f, long size, bool pixels)
         at += AROUND + length;
     }
     inflateEnd(&z);
+    if (profile)
+        *power = SRGB;
     return why;
 }
 
+static bool is_targa(const char *path)
+{
+    const char *dot = strrchr(path, '.');
+    return dot != NULL && strcasecmp(dot, ".tga") == 0;
+}
+
 /* Which of the documented formats the file is of, by its first bytes; NULL with a line. */
-static const char *format_of(const char *path, bool pixels, double *size, struct err *e)
+static const char *format_of(const char *path, enum use use, double *size, double *power,
+                             struct err *e)
 {
     struct stat st;
     FILE *f = fs_open(path);
@@ -128,16 +150,25 @@ static const char *format_of(const char *path, bool pixels, double *size, struct
     *size = (double)st.st_size;
     unsigned char head[8] = {0};
     size_t n = fread(head, 1, sizeof head, f);
-    const char *format = NULL, *why = "not an OpenEXR, Radiance, PNG or PFM file";
+    const char *format = NULL, *why = use == FOR_COLOURS
+                                          ? "not an OpenEXR, PNG, JPEG, Radiance or Targa file"
+                                          : "not an OpenEXR, Radiance, PNG or PFM file";
+    *power = 1;
     if (n == 8 && memcmp(head, "\x76\x2f\x31\x01", 4) == 0) {
         if (exr_header_is_whole(f, head[4] | (unsigned)head[5] << 8, (long)st.st_size - 8))
             format = "openexr";
         why = "the file ends within its header";
     } else if (n == 8 && memcmp(head, "\x89PNG\r\n\x1a\n", 8) == 0) {
-        why = png_refusal(f, (long)st.st_size, pixels);
+        why = png_refusal(f, (long)st.st_size, use != FOR_HEAD, power);
         format = why == NULL ? "png" : NULL;
     } else if (n >= 2 && head[0] == '#' && head[1] == '?') {
         format = "hdr";
+    } else if (use == FOR_COLOURS) {
+        *power = SRGB;
+        if (n >= 3 && memcmp(head, "\xff\xd8\xff", 3) == 0)
+            format = "jpeg";
+        else if (is_targa(path))
+            format = "targa";
     } else if (n >= 3 && head[0] == 'P' && strchr("123456Ff", head[1]) != NULL &&
                isspace(head[2])) {
         format = "pnm";
@@ -177,19 +208,22 @@ static bool check_size(const char *path, const struct image_info *i, int depth, 
 }
 
 /* The library left to itself would try every reader that it has, for seconds and with gigabytes if the file is of none. */
-static struct oiio_image *open_image(const char *path, bool pixels, const struct oiio_table **with,
-                                     struct image_info *out, struct err *e)
+static struct oiio_image *open_image(const char *path, enum use use, const struct oiio_table **with,
+                                     struct image_info *out, double *power, struct err *e)
 {
     double size = 0, bytes = 0;
     int depth = 0;
     char why[800];
-    const char *format = format_of(path, pixels, &size, e);
+    const char *format = format_of(path, use, &size, power, e);
     *with = format != NULL ? load(e) : NULL;
     if (*with == NULL)
         return NULL;
-    struct oiio_image *p = (*with)->open(path, format, why, sizeof why);
+    struct oiio_image *p = (*with)->open(path, format, use == FOR_COLOURS, why, sizeof why);
     if (p == NULL || !(*with)->head(p, out, &depth, &bytes, why, sizeof why))
         err_set(e, "%s: %s", path, why);
+    else if (use == FOR_COLOURS && (double)out->width * out->height > IMAGE_MAX_TEXELS)
+        err_set(e, "%s: %d x %d pixels are more than the %d of a texture", path, out->width,
+                out->height, IMAGE_MAX_TEXELS);
     else if (check_size(path, out, depth, bytes, size, e))
         return p;
     if (p != NULL)
@@ -207,18 +241,15 @@ static bool alloc_like(const struct oiio_table *oiio, const struct oiio_image *p
     return image_alloc(im, info->data_width, info->data_height, info->channels, names, e);
 }
 
-bool image_read(const char *path, struct image *out, bool *half, struct err *e)
+/* The pixels of an open file, which it closes. */
+static bool read_pixels(const char *path, const struct oiio_table *oiio, struct oiio_image *p,
+                        const struct image_info *info, struct image *out, struct err *e)
 {
-    struct image_info info;
     struct image im = {0};
-    const struct oiio_table *oiio;
     struct err inner;
     char why[800];
     const char *name, *value;
-    struct oiio_image *p = open_image(path, true, &oiio, &info, e);
-    if (p == NULL)
-        return false;
-    bool ok = alloc_like(oiio, p, &info, &im, &inner) || err_set(e, "%s: %s", path, inner.msg);
+    bool ok = alloc_like(oiio, p, info, &im, &inner) || err_set(e, "%s: %s", path, inner.msg);
     ok = ok && (oiio->read(p, im.data, why, sizeof why) || err_set(e, "%s: %s", path, why));
     for (int k = 0; ok && oiio->text(p, k, &name, &value); k++)
         ok = image_set_attr(&im, name, value, &inner) || err_set(e, "%s: %s", path, inner.msg);
@@ -228,15 +259,76 @@ bool image_read(const char *path, struct image *out, bool *half, struct err *e)
         return false;
     }
     *out = im;
-    if (half != NULL)
-        *half = info.bytes < 4;
     return true;
+}
+
+bool image_read(const char *path, struct image *out, bool *half, struct err *e)
+{
+    struct image_info info;
+    const struct oiio_table *oiio;
+    double power;
+    struct oiio_image *p = open_image(path, FOR_PIXELS, &oiio, &info, &power, e);
+    if (half != NULL)
+        *half = p != NULL && info.bytes < 4;
+    return p != NULL && read_pixels(path, oiio, p, &info, out, e);
+}
+
+/* Which channels are red, green and blue. */
+static bool colour_channels(const struct image *im, int which[3])
+{
+    static const char *const names[3] = {"R", "G", "B"};
+    int grey = image_channel(im, "Y");
+    if (im->channels <= 2 && grey < 0)
+        grey = 0;
+    for (int c = 0; c < 3; c++) {
+        which[c] = image_channel(im, names[c]);
+        if (which[c] < 0)
+            which[c] = grey;
+    }
+    return which[0] >= 0 && which[1] >= 0 && which[2] >= 0;
+}
+
+static float linear_of(float stored, double power)
+{
+    double c = (double)stored;
+    if (power != SRGB)
+        return power == 1 ? stored : (float)pow(c, power);
+    return (float)(c <= 0.04045 ? c / 12.92 : pow((c + 0.055) / 1.055, 2.4));
+}
+
+static bool take_colours(struct image *im, double power, struct image *out, struct err *e)
+{
+    int which[3];
+    if (!colour_channels(im, which))
+        return err_set(e, "no channels R, G and B");
+    if (!image_alloc(out, im->width, im->height, 3, (const char *const[]){"R", "G", "B"}, e))
+        return false;
+    for (size_t i = 0; i < (size_t)im->width * (size_t)im->height; i++)
+        for (int c = 0; c < 3; c++)
+            out->data[3 * i + (size_t)c] =
+                linear_of(im->data[i * (size_t)im->channels + (size_t)which[c]], power);
+    return true;
+}
+
+bool image_read_colours(const char *path, struct image *out, struct err *e)
+{
+    struct image_info info;
+    struct image im = {0};
+    const struct oiio_table *oiio;
+    double power;
+    struct oiio_image *p = open_image(path, FOR_COLOURS, &oiio, &info, &power, e);
+    if (p == NULL || !read_pixels(path, oiio, p, &info, &im, e))
+        return false;
+    bool ok = image_uncrop(&info, &im, e) && take_colours(&im, power, out, e);
+    image_free(&im);
+    return ok || err_prefix(e, "%s", path);
 }
 
 bool image_inspect(const char *path, struct image_info *out, struct err *e)
 {
     const struct oiio_table *oiio;
-    struct oiio_image *p = open_image(path, false, &oiio, out, e);
+    double power;
+    struct oiio_image *p = open_image(path, FOR_HEAD, &oiio, out, &power, e);
     if (p == NULL)
         return false;
     out->parts = oiio->parts(p);

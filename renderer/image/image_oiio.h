@@ -11,6 +11,13 @@
 bool image_read(const char *path, struct image *out, bool *half, struct err *e)
     __attribute__((warn_unused_result));
 
+/* Reads the colours of an OpenEXR, PNG, JPEG, Radiance or (by its name's ending) Targa file as channels R, G and B of
+ * linear light: for textures. Grey is spread to the three, alpha is left out. OpenEXR and Radiance are linear; PNG is
+ * sRGB, or what its gAMA chunk says; JPEG and Targa are sRGB [IEC 61966-2-1]. Refuses more than IMAGE_MAX_TEXELS pixels. */
+enum { IMAGE_MAX_TEXELS = 1 << 26 };
+bool image_read_colours(const char *path, struct image *out, struct err *e)
+    __attribute__((warn_unused_result));
+
 /* What a file stores, told by its header: for a reader that must know how exact the numbers are. */
 enum image_type {
     IMAGE_INT8,

@@ -51,14 +51,17 @@ enum image_type type_of(OIIO::TypeDesc type)
                                             : IMAGE_OTHER;
 }
 
-struct oiio_image *open_image(const char *path, const char *format, char *why, size_t size)
+struct oiio_image *open_image(const char *path, const char *format, bool straight, char *why,
+                              size_t size)
 {
     std::unique_ptr<oiio_image> p;
     bool ok = guarded(why, size, [&]() -> std::string {
         p = std::make_unique<oiio_image>();
-        OIIO::ImageSpec spec;
+        OIIO::ImageSpec spec, how;
+        if (straight)
+            how["oiio:UnassociatedAlpha"] = 1;
         p->in = OIIO::ImageInput::create(format);
-        if (!p->in || !p->in->open(path, spec))
+        if (!p->in || !p->in->open(path, spec, how))
             return "cannot read: " + (p->in ? p->in->geterror() : OIIO::geterror());
         for (const auto &a : spec.extra_attribs)
             if (a.type() == OIIO::TypeDesc::STRING)

@@ -11,8 +11,9 @@ struct oiio_image; /* an open file */
 
 struct oiio_table {
     const char *version;
-    /* NULL with why: not an image of OpenImageIO's format of that name. */
-    struct oiio_image *(*open)(const char *path, const char *format, char *why, size_t size);
+    /* NULL with why: not an image of OpenImageIO's format of that name. straight: colours as stored, not times alpha. */
+    struct oiio_image *(*open)(const char *path, const char *format, bool straight, char *why,
+                               size_t size);
     void (*close)(struct oiio_image *p);
     /* All but `parts`. *depth: of a volume; *bytes: of the pixels as stored, unpacked. */
     bool (*head)(struct oiio_image *p, struct image_info *out, int *depth, double *bytes, char *why,

@@ -7,6 +7,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Texture coordinates, of either sign. */
+#define MOST_UV 1e6f
+
 void scene_free(struct scene *s)
 {
     free(s->position);
@@ -21,6 +24,11 @@ void scene_free(struct scene *s)
     free(s->materials);
     free(s->lights);
     free(s->objects);
+    for (uint32_t i = 0; i < s->num_images; i++)
+        image_free(&s->images[i]);
+    free(s->images);
+    free(s->textures);
+    free(s->uv);
     environment_free(s->environment);
     memset(s, 0, sizeof *s);
 }
@@ -50,6 +58,37 @@ static bool material_numbers_are_valid(const struct material *m)
            is_radiometric(m->eta) && is_radiometric(m->k);
 }
 
+/* What a colour is at most where a map multiplies it; negative or NaN if it is so somewhere. */
+static rgb largest(const struct scene *s, rgb factor, uint32_t map)
+{
+    if (map == 0)
+        return factor;
+    const rgb low = texture_min(&s->textures[map - 1]), high = texture_max(&s->textures[map - 1]);
+    return rgb_mul(factor, is_radiometric(low) ? high : low);
+}
+
+/* The range of what maps make of colours, and that nothing else has one. */
+static bool check_maps(const struct scene *s, const struct material *m, const char *where,
+                       struct err *e)
+{
+    if (m->reflectance_map > s->num_textures || m->radiance_map > s->num_textures ||
+        (m->reflectance_map != 0 && m->kind != MATERIAL_DIFFUSE) || s->uv == NULL)
+        return err_set(e, "%s: material '%s': a texture that is not there, or not diffuse", where,
+                       m->name);
+    rgb reflectance = largest(s, m->reflectance, m->reflectance_map);
+    if (!is_radiometric(reflectance) || rgb_max(reflectance) > 1)
+        return err_set(e, "%s: material '%s': reflectance outside [0,1] in its texture", where,
+                       m->name);
+    return is_radiometric(largest(s, m->radiance, m->radiance_map)) ||
+           err_set(e, "%s: material '%s': radiance negative or not finite in its texture", where,
+                   m->name);
+}
+
+static bool has_map(const struct material *m)
+{
+    return m->reflectance_map != 0 || m->radiance_map != 0;
+}
+
 static bool check_materials(const struct scene *s, const char *where, struct err *e)
 {
     for (uint32_t i = 0; i < s->num_materials; i++) {
@@ -63,6 +102,8 @@ static bool check_materials(const struct scene *s, const char *where, struct err
                            where, m->name);
         if (!is_radiometric(m->radiance))
             return err_set(e, "%s: material '%s': radiance negative or not finite", where, m->name);
+        if (has_map(m) && !check_maps(s, m, where, e))
+            return false;
     }
     return true;
 }
@@ -131,6 +172,8 @@ static bool check_objects(const struct scene *s, const char *where, struct err *
         if (o->first_triangle != triangles || o->first_sphere != spheres)
             return err_set(e, "%s: object '%s': its primitives do not follow the last object's",
                            where, o->name);
+        if (o->num_spheres > 0 && has_map(&s->materials[o->material]))
+            return err_set(e, "%s: object '%s': a texture on a sphere", where, o->name);
         triangles += o->num_triangles;
         spheres += o->num_spheres;
     }
@@ -162,6 +205,9 @@ static bool check_primitives(const struct scene *s, const char *where, struct er
                 return err_set(e, "%s: triangle %u: position not finite", where, i);
             if (!is_unit(s->normal[k]))
                 return err_set(e, "%s: triangle %u: normal not of unit length", where, i);
+            if (s->uv != NULL && !(fabsf(s->uv[k].u) <= MOST_UV && fabsf(s->uv[k].v) <= MOST_UV))
+                return err_set(e, "%s: triangle %u: texture coordinate beyond %g", where, i,
+                               (double)MOST_UV);
         }
     }
     for (uint32_t i = 0; i < s->num_spheres; i++) {
@@ -221,10 +267,12 @@ static bool append_area_lights(struct scene *s, const char *where, struct err *e
             if (!(area > 0) || !(area <= FLT_MAX))
                 return err_set(e, "%s: object '%s': emits, but its area is %g", where, o->name,
                                area);
-            s->lights[s->num_lights++] = (struct light){.kind = LIGHT_TRIANGLES,
-                                                        .first = o->first_triangle,
-                                                        .count = o->num_triangles,
-                                                        .area = (float)area};
+            s->lights[s->num_lights++] =
+                (struct light){.kind = LIGHT_TRIANGLES,
+                               .first = o->first_triangle,
+                               .count = o->num_triangles,
+                               .area = (float)area,
+                               .textured = s->materials[o->material].radiance_map != 0};
         }
         for (uint32_t k = o->first_sphere; k < o->first_sphere + o->num_spheres; k++) {
             double r = s->spheres[k].radius, sphere_area = 4 * pi * r * r;

@@ -6,8 +6,10 @@
 #ifndef ASSAY_SCENE_H
 #define ASSAY_SCENE_H
 
+#include "texture.h"
+
 #include "renderer/base/err.h"
-#include "renderer/math/vec.h"
+#include "renderer/image/image.h"
 
 #include <stddef.h>
 #include <stdint.h>
@@ -50,7 +52,8 @@ enum microfacet_kind {
 #define MICROFACET_MIN_ALPHA 1e-4f
 
 /* Emission and reflection are independent: an emitter may reflect too. A factor that a kind does not
- * have is 0, and only rough conductors are `conductor`. */
+ * have is 0, and only rough conductors are `conductor`. A map is 1 + the number of a texture that the colour is multiplied by at every
+ * place, 0 without one; only diffuse reflectance and radiance have one. */
 struct material {
     char name[64];
     enum material_kind kind;
@@ -66,6 +69,7 @@ struct material {
     rgb eta, k;               /* microfacet: complex index of refraction against air */
     rgb radiance;             /* emitted radiance; zero for most */
     bool radiance_both_sides; /* else only from the side the geometric normal points to */
+    uint32_t reflectance_map, radiance_map;
 };
 
 /* normal_out: +1, the geometric normal points away from the centre; -1, towards it (an interior).
@@ -99,6 +103,7 @@ struct light {
     uint32_t first; /* triangles: first triangle; sphere: index of the sphere */
     uint32_t count; /* triangles: they are contiguous, first .. first+count-1 */
     float area;     /* triangles, sphere: total, one side */
+    bool textured;  /* triangles: radiance differs from place to place */
 };
 
 /* One named node instance of the file; the unit of object-id images and of the exporters. */
@@ -133,6 +138,10 @@ struct scene {
     struct sphere *spheres;
     uint32_t *sphere_material, *sphere_object;
     int32_t *sphere_light;
+    uint32_t num_images, num_textures;
+    struct image *images;     /* R G B, linear */
+    struct texture *textures; /* of these images */
+    struct uv *uv; /* 3 per triangle, of use where its material has a map; NULL: no map anywhere */
     struct material *materials;
     struct light *lights;
     struct object *objects;
@@ -161,8 +170,9 @@ bool material_is_black(const struct material *m);
  * triangles and one for each sphere of each emissive object (in object order), allocates and fills
  * tri_light and sphere_light, fills areas and bounds. `lights` must come from malloc() or be NULL.
  * Fails on an index out of range, objects that are not contiguous, a value that is not finite, a
- * normal not of unit length, a negative reflectance or radiance, a reflectance above 1, or a scene
- * without primitives; `where` starts the line. */
+ * normal not of unit length, a negative reflectance or radiance, a reflectance above 1 (a texture's
+ * counts), a texture on a sphere or a coordinate of it beyond 1e6, or a scene without primitives;
+ * `where` starts the line. */
 bool scene_finish(struct scene *s, const char *where, struct err *e)
     __attribute__((warn_unused_result));
 
@@ -173,6 +183,13 @@ bool scene_add_environment(struct scene *s, struct environment *env, struct err 
 /* The same of a file (environment_read()); each failure is a line with its path. */
 bool scene_read_environment(struct scene *s, const char *path, struct err *e)
     __attribute__((warn_unused_result));
+
+/* A map (not 0) at barycentric coordinates (b1, b2) of a triangle. */
+static inline rgb scene_map_at(const struct scene *s, uint32_t map, uint32_t triangle, float b1,
+                               float b2)
+{
+    return texture_on_triangle(&s->textures[map - 1], s->uv + 3 * (size_t)triangle, b1, b2);
+}
 
 static inline uint32_t scene_num_primitives(const struct scene *s)
 {

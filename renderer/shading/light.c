@@ -6,13 +6,52 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void fill_record(const vec3 p[3], double *area, float *r)
+static double triangle_area(const vec3 p[3])
+{
+    return 0.5 * (double)length(cross(sub(p[1], p[0]), sub(p[2], p[0])));
+}
+
+static void fill_record(const vec3 p[3], double weight, double *area, float *r)
 {
     vec3 e1 = sub(p[1], p[0]), e2 = sub(p[2], p[0]), ng = normalize(cross(e1, e2));
-    *area += 0.5 * (double)length(cross(e1, e2));
-    const float words[] = {p->x, p->y, p->z, e1.x, e1.y, e1.z,        e2.x,
-                           e2.y, e2.z, ng.x, ng.y, ng.z, (float)*area};
+    *area += weight * triangle_area(p);
+    const float words[] = {p->x, p->y, p->z, e1.x, e1.y, e1.z,         e2.x,
+                           e2.y, e2.z, ng.x, ng.y, ng.z, (float)*area, (float)weight};
     memcpy(r, words, sizeof words);
+}
+
+static const struct material *material_of(const struct scene *s, const struct light *l)
+{
+    return &s->materials[l->kind == LIGHT_TRIANGLES ? s->tri_material[l->first]
+                                                    : s->sphere_material[l->first]];
+}
+
+/* Luminance of triangle i of a textured light, a mean. */
+static double texture_luminance(const struct scene *s, const struct light *l, uint32_t i)
+{
+    const struct material *m = material_of(s, l);
+    return texture_mean_luminance(&s->textures[m->radiance_map - 1],
+                                  s->uv + 3 * (size_t)(l->first + i), m->radiance);
+}
+
+/* The same of all its triangles. */
+static double light_luminance(const struct scene *s, const struct light *l)
+{
+    double sum = 0, area = 0;
+    if (!l->textured)
+        return rgb_luminance(material_of(s, l)->radiance);
+    for (uint32_t i = 0; i < l->count; i++) {
+        double a = triangle_area(s->position + 3 * (size_t)(l->first + i));
+        sum += a * texture_luminance(s, l, i);
+        area += a;
+    }
+    return sum / area;
+}
+
+/* How much more often than by its area triangle i is chosen; its mean over the area is 1. mean: light_luminance(). */
+static double triangle_weight(const struct scene *s, const struct light *l, uint32_t i, double mean)
+{
+    return l->textured && mean > 0 ? 0.1 + 0.9 * texture_luminance(s, l, i) / mean : 1;
 }
 
 /* Records of the triangles of all lights. */
@@ -29,9 +68,10 @@ static bool build_records(struct light_table *t, const struct scene *s)
         return false;
     for (uint32_t l = 0; l < s->num_lights; l++) {
         const struct light *light = &s->lights[l];
-        double area = 0;
+        double area = 0, mean = light->textured ? light_luminance(s, light) : 0;
         for (uint32_t i = 0; light->kind == LIGHT_TRIANGLES && i < light->count; i++)
-            fill_record(s->position + 3 * (size_t)(light->first + i), &area,
+            fill_record(s->position + 3 * (size_t)(light->first + i),
+                        triangle_weight(s, light, i, mean), &area,
                         t->lamp + LAMP_WORDS * (size_t)(t->first[l] + i));
     }
     return true;
@@ -42,7 +82,6 @@ static double light_power(const struct scene *s, const struct light *l)
     const double pi = 3.14159265358979323846;
     double r = 0.5 * (double)length(sub(s->bounds_max, s->bounds_min)), r2 = r * r;
     double falloff = (double)l->attenuation[0] + r * l->attenuation[1] + r2 * l->attenuation[2];
-    const struct material *m = NULL;
     switch (l->kind) {
     case LIGHT_POINT: return 4 * pi * rgb_luminance(l->value) / falloff * r2;
     case LIGHT_SPOT: {
@@ -50,11 +89,17 @@ static double light_power(const struct scene *s, const struct light *l)
         return 2 * pi * (1 - pow(l->cos_cutoff, n)) / n * rgb_luminance(l->value) / falloff * r2;
     }
     case LIGHT_DIRECTIONAL: return pi * r2 * rgb_luminance(l->value);
-    case LIGHT_TRIANGLES: m = &s->materials[s->tri_material[l->first]]; break;
-    case LIGHT_SPHERE: m = &s->materials[s->sphere_material[l->first]]; break;
+    case LIGHT_TRIANGLES:
+    case LIGHT_SPHERE: break;
     case LIGHT_ENVIRONMENT: return pi * r2 * environment_total(s->environment);
     }
-    return (m->radiance_both_sides ? 2 : 1) * pi * (double)l->area * rgb_luminance(m->radiance);
+    const struct material *m = material_of(s, l);
+    double mean = light_luminance(s, l);
+    /* What the mean has missed must still be chosen some time. */
+    if (l->textured)
+        mean = fmax(mean, 1e-3 * rgb_luminance(rgb_mul(
+                                     m->radiance, texture_max(&s->textures[m->radiance_map - 1]))));
+    return (m->radiance_both_sides ? 2 : 1) * pi * (double)l->area * mean;
 }
 
 /* NULL if none of them has power; *ok false if that is for want of memory. */
@@ -142,10 +187,10 @@ struct light_sample light_sample_direction(const struct light_table *t, uint32_t
                                  .delta = s.delta != 0};
 }
 
-float light_pdf_w(const struct light_table *t, uint32_t l, vec3 p, vec3 wi, float d,
+float light_pdf_w(const struct light_table *t, uint32_t l, uint32_t prim, vec3 p, vec3 wi, float d,
                   const struct surface *hit)
 {
     const struct light *light = &t->scene->lights[l];
     assert(light->kind == LIGHT_TRIANGLES || light->kind == LIGHT_SPHERE);
-    return pdf_of_light(t, (const int32_t[]){(int32_t)l}, p, wi, d, hit->ng, 1);
+    return pdf_of_light(t, (const int32_t[]){(int32_t)l}, &prim, p, wi, d, hit->ng, 1);
 }

@@ -1,6 +1,7 @@
 /* Choosing a light, sampling it from a point, and the density of doing so. Areas are sampled uniformly (pdf_a
  * = 1/area, turned into pdf_w = pdf_a d^2 / cos_l at the receiver [Veach97 8.2]); a sphere seen
- * from outside, uniformly over the cone it subtends [Shirley96]. */
+ * from outside, uniformly over the cone it subtends [Shirley96]; of triangles with a texture each in proportion to the
+ * mean of the texture over it, and uniformly within, with a tenth of all samples by area alone so that no place is left out. */
 #ifndef ASSAY_LIGHT_H
 #define ASSAY_LIGHT_H
 
@@ -29,7 +30,7 @@ struct light_choice {
  *   point         4 pi value / (att[0] + att[1] R + att[2] R^2) R^2, which is 4 pi value if physical
  *   spot          the same with 2 pi (1 - cos_cutoff^(exponent+1)) / (exponent+1) for 4 pi
  *   directional   pi R^2 value
- *   triangles, sphere   pi radiance area, twice if both sides emit
+ *   triangles, sphere   pi radiance area, twice if both sides emit; textured: about the mean radiance
  *   environment   pi R^2 times its radiance summed over directions
  * only_delta: among the delta lights alone. */
 struct light_choice light_choose(const struct light_table *t, bool only_delta, float u);
@@ -52,9 +53,9 @@ struct light_sample {
 struct light_sample light_sample_direction(const struct light_table *t, uint32_t l, vec3 p,
                                            const float u[4]);
 
-/* The density with which light l (an area light) would have sampled the place `hit`, found from p
- * along unit wi at distance d. The environment has environment_pdf_w(). */
-float light_pdf_w(const struct light_table *t, uint32_t l, vec3 p, vec3 wi, float d,
+/* The density with which light l (an area light) would have sampled the place `hit` of primitive
+ * prim, found from p along unit wi at distance d. The environment has environment_pdf_w(). */
+float light_pdf_w(const struct light_table *t, uint32_t l, uint32_t prim, vec3 p, vec3 wi, float d,
                   const struct surface *hit);
 
 static inline bool light_is_delta(const struct light *l)

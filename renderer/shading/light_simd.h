@@ -11,8 +11,10 @@
 enum {
     /* Up to so many triangles of a light are looked through one by one. */
     FEW_TRIANGLES = 8,
-    /* Words of the record of a light's triangle: corner, two edges, normal, then the area up to and including it. */
+    /* Words of the record of a light's triangle: corner, two edges, normal, then the area up to and including it, each triangle's
+     * times its weight, and its weight: 1, or how much more often it is chosen for its texture. */
     LAMP_AREA = 12,
+    LAMP_WEIGHT = 13,
     LAMP_WORDS = 16
 };
 
@@ -75,7 +77,7 @@ static inline struct lamp lamp_of(const struct light_table *t, uint32_t l)
 
 static inline bool is_lamp(const struct light *light)
 {
-    return light->kind == LIGHT_TRIANGLES && light->count <= FEW_TRIANGLES;
+    return light->kind == LIGHT_TRIANGLES && light->count <= FEW_TRIANGLES && !light->textured;
 }
 
 /* pdf_w and direction for a place on an area light of density pdf_a there. */
@@ -136,17 +138,38 @@ static inline int lamp_search(const float *record, int count, float target)
     return lo;
 }
 
-/* Of many triangles. */
-INLINE void sample_mesh(const struct lamp *l, vec3v p, const vf u[4], struct light_samplev *out)
+/* Of many triangles; number: which. */
+INLINE void sample_mesh(const struct lamp *l, vec3v p, const vf u[4], int32_t number[LANES],
+                        struct light_samplev *out)
 {
     const float all = l->record[LAMP_WORDS * ((size_t)l->count - 1) + LAMP_AREA];
-    int32_t number[LANES];
     vf q[2 * COLUMNS];
     for (int i = 0; i < LANES; i++)
         number[i] = lamp_search(l->record, l->count, LANE(u[2], i) * all);
     for (int i = 0; i < 2; i++)
         gather_columns(l->record + COLUMNS * i, LAMP_WORDS, number, q + COLUMNS * i);
     sample_triangle(l, q, p, u, out);
+}
+
+/* Of triangles with a texture. */
+static __attribute__((noinline)) void sample_textured(const struct scene *s,
+                                                      const struct light *light,
+                                                      const struct lamp *l, vec3v p, const vf u[4],
+                                                      unsigned mask, struct light_samplev *out)
+{
+    int32_t number[LANES];
+    vf b1, b2;
+    const uint32_t map = s->materials[s->tri_material[light->first]].radiance_map;
+    sample_mesh(l, p, u, number, out);
+    warp_triangle(u[0], u[1], &b1, &b2);
+    for (; mask; mask &= mask - 1) {
+        int i = __builtin_ctz(mask);
+        rgb texel =
+            scene_map_at(s, map, light->first + (uint32_t)number[i], LANE(b1, i), LANE(b2, i));
+        rgb_set_lane(&out->radiance, i, rgb_mul(l->radiance, texel));
+        LANE(out->pdf_w, i) *=
+            rgb_is_zero(texel) ? 0 : l->record[LAMP_WORDS * (size_t)number[i] + LAMP_WEIGHT];
+    }
 }
 
 /* 1 - cos of the half angle that a sphere subtends at squared distance d2 > r2, without the
@@ -266,8 +289,10 @@ INLINE void sample_light_from(const struct light_table *t, uint32_t l, vec3v p, 
         lamp = lamp_of(t, l);
         if (is_lamp(light))
             sample_lamp(&lamp, p, u, out);
+        else if (light->textured)
+            sample_textured(s, light, &lamp, p, u, mask, out);
         else
-            sample_mesh(&lamp, p, u, out);
+            sample_mesh(&lamp, p, u, (int32_t[LANES]){0}, out);
         if (s->starter != 0)
             as_starter(s, light, &lamp, p, out);
         return;
@@ -282,9 +307,9 @@ INLINE void sample_light_from(const struct light_table *t, uint32_t l, vec3v p, 
     }
 }
 
-/* light_pdf_w() for the lanes of the mask; ng: the normal of the place. */
-INLINE vf pdf_of_light(const struct light_table *t, const int32_t light[LANES], vec3v p, vec3v wi,
-                       vf d, vec3v ng, unsigned mask)
+/* light_pdf_w() for the lanes of the mask; ng: the normal of the place, on primitives `prim`. */
+INLINE vf pdf_of_light(const struct light_table *t, const int32_t light[LANES],
+                       const uint32_t prim[LANES], vec3v p, vec3v wi, vf d, vec3v ng, unsigned mask)
 {
     const struct scene *s = t->scene;
     const vf zero = vf_set(0);
@@ -295,6 +320,10 @@ INLINE vf pdf_of_light(const struct light_table *t, const int32_t light[LANES], 
         int i = __builtin_ctz(mask);
         const struct light *l = &s->lights[light[i]];
         LANE(area, i) = l->area;
+        if (l->textured)
+            LANE(area, i) /=
+                t->lamp[LAMP_WORDS * (size_t)(t->first[light[i]] + prim[i] - l->first) +
+                        LAMP_WEIGHT];
         if (l->kind == LIGHT_SPHERE && s->spheres[l->first].normal_out > 0) {
             round |= 1u << i;
             LANE(radius, i) = s->spheres[l->first].radius;

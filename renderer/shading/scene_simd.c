@@ -66,7 +66,8 @@ void scene_simd_material(const struct material *m, float r[MATERIAL_WORDS])
     set_int(r + MATERIAL_BITS, 1 << m->kind | (material_is_black(m) ? MATERIAL_IS_BLACK : 0) |
                                    (m->schlick ? MATERIAL_IS_SCHLICK : 0) |
                                    (m->separable ? MATERIAL_IS_SEPARABLE : 0) |
-                                   (m->conductor ? MATERIAL_IS_CONDUCTOR : 0));
+                                   (m->conductor ? MATERIAL_IS_CONDUCTOR : 0) |
+                                   (m->reflectance_map != 0 ? MATERIAL_IS_TEXTURED : 0));
     set_int(r + MATERIAL_FACETS, (int32_t)m->microfacet);
 }
 
@@ -92,6 +93,7 @@ struct scene_simd *scene_simd_build(const struct scene *s, struct err *e)
         fill_sphere(s, i, l->primitive + RECORD_WORDS * (size_t)(s->num_triangles + i));
     for (uint32_t i = 0; i < s->num_materials; i++) {
         scene_simd_material(&s->materials[i], l->material + MATERIAL_WORDS * (size_t)i);
+        l->has_textures |= s->materials[i].reflectance_map != 0;
         l->only_diffuse = l->only_diffuse && (s->materials[i].kind == MATERIAL_DIFFUSE ||
                                               material_is_black(&s->materials[i]));
     }

@@ -37,13 +37,14 @@ enum {
     MATERIAL_IS_BLACK = 1 << 8,
     MATERIAL_IS_SCHLICK = 1 << 9,
     MATERIAL_IS_SEPARABLE = 1 << 10,
-    MATERIAL_IS_CONDUCTOR = 1 << 11
+    MATERIAL_IS_CONDUCTOR = 1 << 11,
+    MATERIAL_IS_TEXTURED = 1 << 12 /* its reflectance */
 };
 
 struct scene_simd {
     float *primitive; /* RECORD_WORDS of each; triangles, then spheres */
     float *material;  /* MATERIAL_WORDS of each */
-    bool only_diffuse, has_spheres;
+    bool only_diffuse, has_spheres, has_textures;
 };
 
 /* Fills the record of a material. */

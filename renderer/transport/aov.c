@@ -33,6 +33,10 @@ void first_hits_record(const struct integrator *it, struct batch *b, int num_act
         b->first.object[i] = is_triangle ? s->tri_object[prim] : s->sphere_object[sphere];
         b->first.depth[i] = -dot(sub(at.p, c->eye), c->backward);
         vec3s_set(&b->first.normal, i, at.ns);
-        rgbs_set(&b->first.albedo, i, albedo_of(&s->materials[material]));
+        rgb albedo = albedo_of(&s->materials[material]);
+        uint32_t map = s->materials[material].reflectance_map;
+        if (map != 0)
+            albedo = rgb_mul(albedo, scene_map_at(s, map, prim, b->hit.u[i], b->hit.v[i]));
+        rgbs_set(&b->first.albedo, i, albedo);
     }
 }

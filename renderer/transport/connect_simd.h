@@ -295,7 +295,7 @@ static __attribute__((noinline)) void connect_hemisphere(const struct integrator
         surfaces(it, &b->shadow, &b->shadow_hit, k, &at);
         vi missed = vi_eq(vi_load_any(b->shadow_hit.prim + k), vi_set(-1));
         vi lit = ~missed & vi_lt(vi_set(-1), at.light);
-        rgbv le = emitted(s, &at, d, cast & bits(lit));
+        rgbv le = emitted(s, &at, &b->shadow_hit, k, d, cast & bits(lit));
         if (s->environment != NULL) {
             le = rgb_select(missed, surroundings(s, d, cast & bits(missed)), le);
             lit |= missed;

@@ -47,8 +47,9 @@ INLINE void surfaces(const struct integrator *it, const struct rays *r, const st
     s->ns = v3_select(sphere, n, s->ns);
 }
 
-/* Radiance that the lanes of the mask see, along d, of emitters' surfaces. */
-INLINE rgbv emitted(const struct scene *scene, const struct surfacev *s, vec3v d, unsigned mask)
+/* Radiance that the lanes of the mask see, along d, of emitters' surfaces: of hits from k. */
+INLINE rgbv emitted(const struct scene *scene, const struct surfacev *s, const struct hits *h,
+                    int k, vec3v d, unsigned mask)
 {
     rgbv le = rgb_all(grey(0));
     unsigned both_sides = 0;
@@ -56,7 +57,11 @@ INLINE rgbv emitted(const struct scene *scene, const struct surfacev *s, vec3v d
         int i = __builtin_ctz(mask);
         const struct material *m = &scene->materials[LANE(s->material, i)];
         both_sides |= (unsigned)m->radiance_both_sides << i;
-        rgb_set_lane(&le, i, m->radiance);
+        rgb radiance = m->radiance;
+        if (m->radiance_map != 0)
+            radiance = rgb_mul(radiance, scene_map_at(scene, m->radiance_map, h->prim[k + i],
+                                                      h->u[k + i], h->v[k + i]));
+        rgb_set_lane(&le, i, radiance);
     }
     vi front = vf_lt(vf_set(0), dotv(s->ng, negv(d)));
     return rgb_where(lanes_of(both_sides) | front, le);
@@ -95,7 +100,7 @@ INLINE vf emission_weight(const struct integrator *it, const struct batch *b, in
     vec3v d = v3_load(&b->ray.d, k);
     mask &= ~bits(certain);
     if (s != NULL)
-        pdf_light = pdf_of_light(it->lights, light, v3_load(&b->ray.o, k), d,
+        pdf_light = pdf_of_light(it->lights, light, b->hit.prim + k, v3_load(&b->ray.o, k), d,
                                  vf_load_any(b->hit.t + k), s->ng, mask);
     for (unsigned m = mask; m; m &= m - 1) {
         int i = __builtin_ctz(m);
@@ -117,7 +122,7 @@ static __attribute__((noinline)) void add_emission(const struct integrator *it, 
     int32_t light[LANES];
     rgbv le;
     if (s != NULL) {
-        le = emitted(it->scene, s, d, mask);
+        le = emitted(it->scene, s, &b->hit, k, d, mask);
         vi_store_any(light, s->light);
     } else {
         if (environment_is_hidden(it->scene->environment))
@@ -128,6 +133,22 @@ static __attribute__((noinline)) void add_emission(const struct integrator *it, 
     mask &= ~bits(rgb_is_zerov(le));
     vf w = emission_weight(it, b, k, mask, light, s);
     gather_light(b, k, lanes_of(mask), rgb_scalev(rgb_mulv(rgb_load(&b->throughput, k), le), w));
+}
+
+/* Multiplies the reflectance of the lanes of the mask by what their surfaces' textures have there; a path on black is over. */
+static __attribute__((noinline)) void apply_textures(const struct integrator *it, struct batch *b,
+                                                     int k, unsigned mask)
+{
+    const struct scene *s = it->scene;
+    for (; mask; mask &= mask - 1) {
+        int i = k + __builtin_ctz(mask);
+        rgb texel = scene_map_at(s, s->materials[b->material[i]].reflectance_map, b->hit.prim[i],
+                                 b->hit.u[i], b->hit.v[i]);
+        rgb r = rgb_mul(rgbs_get(&b->reflectance, i), texel);
+        rgbs_set(&b->reflectance, i, r);
+        if (rgb_is_zero(r))
+            b->goes_on[k / LANES] &= (uint8_t) ~(1u << (i - k));
+    }
 }
 
 /* Adds emission, sets up the surfaces, and says which paths go on. */
@@ -175,6 +196,8 @@ static void shade(const struct integrator *it, struct batch *b, int n, int verte
         vi_store_any(b->material + k, s.material);
         vi_store_any(b->bits + k, about);
         rgb_store(&b->reflectance, k, (rgbv){material[0], material[1], material[2]});
+        if (ls->has_textures)
+            apply_textures(it, b, k, there & bits(has_bits(about, MATERIAL_IS_TEXTURED)));
         store_flags(b->front + k, front);
     }
 }

@@ -3,6 +3,7 @@
 #include <assert.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 enum { ROOM = 4096 };
 
@@ -26,6 +27,9 @@ struct scene build_scene(void)
     s.materials = array(sizeof *s.materials);
     s.lights = array(sizeof *s.lights);
     s.objects = array(sizeof *s.objects);
+    s.uv = array(3 * sizeof *s.uv);
+    s.images = array(sizeof *s.images);
+    s.textures = array(sizeof *s.textures);
     return s;
 }
 
@@ -69,6 +73,31 @@ void build_quad(struct scene *s, vec3 p, vec3 u, vec3 v, uint32_t material)
     put_triangle(s, p, add(p, u), add(add(p, u), v), material);
     put_triangle(s, p, add(add(p, u), v), add(p, v), material);
     o->num_triangles = 2;
+    const struct uv corners[6] = {{0, 0}, {1, 0}, {1, 1}, {0, 0}, {1, 1}, {0, 1}};
+    memcpy(s->uv + 3 * (size_t)o->first_triangle, corners, sizeof corners);
+}
+
+uint32_t build_texture(struct scene *s, int width, int height, const rgb *colours, bool nearest,
+                       enum texture_wrap wrap)
+{
+    struct err e;
+    assert(s->num_images < ROOM);
+    struct image *im = &s->images[s->num_images++];
+    if (!image_alloc(im, width, height, 3, (const char *const[]){"R", "G", "B"}, &e))
+        abort();
+    memcpy(im->data, colours, (size_t)width * (size_t)height * sizeof *colours);
+    s->textures[s->num_textures++] = (struct texture){.width = width,
+                                                      .height = height,
+                                                      .wrap = {wrap, wrap},
+                                                      .nearest = nearest,
+                                                      .texel = im->data};
+    return s->num_textures;
+}
+
+void build_uv(struct scene *s, uint32_t first, float scale, struct uv offset)
+{
+    for (size_t k = 3 * (size_t)first; k < 3 * (size_t)s->num_triangles; k++)
+        s->uv[k] = (struct uv){offset.u + scale * s->uv[k].u, offset.v + scale * s->uv[k].v};
 }
 
 void build_triangle(struct scene *s, vec3 a, vec3 b, vec3 c, uint32_t material)

@@ -13,6 +13,11 @@ uint32_t build_material(struct scene *s, rgb reflectance, rgb radiance);
 /* Parallelogram p, p+u, p+u+v, p+v as two triangles of one object; front side u x v. */
 void build_quad(struct scene *s, vec3 p, vec3 u, vec3 v, uint32_t material);
 void build_triangle(struct scene *s, vec3 a, vec3 b, vec3 c, uint32_t material);
+/* A texture of width x height colours by rows from the top, its own image; the map's number. Coordinates of quads are (0,0) at p and
+ * (1,1) at p+u+v; build_uv() moves those of triangles from `first` on to offset + scale times that. */
+uint32_t build_texture(struct scene *s, int width, int height, const rgb *colours, bool nearest,
+                       enum texture_wrap wrap);
+void build_uv(struct scene *s, uint32_t first, float scale, struct uv offset);
 void build_sphere(struct scene *s, vec3 centre, float radius, float normal_out, uint32_t material);
 void build_light(struct scene *s, struct light light);
 /* Pinhole at `eye` looking along -Z with Y up, full horizontal angle in degrees. */

@@ -55,6 +55,7 @@ static const char *const fixed_names[NUM_FIXED] = {
     [FEATURE_SMOOTH] = "shading normals",
     [FEATURE_LENS] = "a lens",
     [FEATURE_CLIP] = "a near or far plane",
+    [FEATURE_TEXTURE] = "textures",
     [TRAIT_SPECULAR] = "a mirror, glass or refraction",
     [TRAIT_BOUNDARY] = "glass or refraction",
     [TRAIT_ROUGH] = "rough metal",

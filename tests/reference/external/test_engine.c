@@ -308,7 +308,7 @@ TEST(materials_and_lights_have_features)
         {.kind = LIGHT_DIRECTIONAL, .value = {1, 1, 1}, .to_light = {0, 1, 0}},
     };
     const unsigned of_light[] = {1u << FEATURE_SPOT, 1u << FEATURE_DIRECTIONAL};
-    for (size_t i = 0; i < 10; i++) {
+    for (size_t i = 0; i < 11; i++) {
         struct scene s = build_scene();
         struct camera c;
         struct err e;
@@ -327,10 +327,19 @@ TEST(materials_and_lights_have_features)
             s.normal[0] = normalize(v3(0.01f, 0, 1));
             want = 1u << FEATURE_SMOOTH;
         }
+        if (i == 10) {
+            const rgb texel = {0.1f, 0.2f, 0.3f};
+            s.materials[m].reflectance = grey(1);
+            s.materials[m].reflectance_map = build_texture(&s, 1, 1, &texel, true, TEXTURE_CLAMP);
+            want = 1u << FEATURE_DIFFUSE | 1u << FEATURE_TEXTURE;
+        }
         build_camera(&s, v3(0, 0, 0), 40);
         if (!scene_finish(&s, "test", &e) || !camera_init(&c, &s, 8, 8, &e))
             fail_msg("%s", e.msg);
         assert_int_equal(features_of_scene(&s, &c), want);
+        assert_int_equal(features_check_textures("x", &s, &e), i != 10);
+        assert_true(i != 10 ||
+                    strcmp(e.msg, "x: the texture of material 'm' cannot be expressed") == 0);
         scene_free(&s);
     }
 }

@@ -7,6 +7,7 @@
 #include "tests/support/test.h"
 
 #include <openexr.h>
+#include <zlib.h>
 
 enum { WIDTH = 37, HEIGHT = 29, CHANNELS = 5, MAX_FILE = 1 << 16 };
 static const char *const channel[CHANNELS] = {"R", "G", "B", "variance.R", "Z"};
@@ -322,6 +323,106 @@ TEST(deep_pixels_and_whole_numbers_are_refused)
     REFUSES(image_read_exr(path, &im, &half, &e), "deep.exr: has deep pixels");
     REFUSES(image_read_exr_head(path, &im, &e), "deep.exr: has deep pixels");
     REFUSES(image_read(path, &im, &half, &e), "deep.exr: has deep pixels");
+}
+
+/* Writes an image of 8 x 8 of the source's name, one colour, by oiiotool; reads its colours. */
+static struct image read_flat(const char *name, const char *channels, const char *colour,
+                              const char *const attribute[2], const char *depth)
+{
+    char path[256], fill[64];
+    struct err e = {""};
+    struct image im;
+    snprintf(fill, sizeof fill, "--fill:color=%s", colour);
+    const char *const options[] = {"--create",   "8x8",        channels, fill,  "8x8", "--attrib",
+                                   attribute[0], attribute[1], "-d",     depth, NULL};
+    oiiotool(options, name);
+    MUST(image_read_colours(path_of(path, name), &im, &e));
+    assert_true(im.width == 8 && im.height == 8 && im.channels == 3);
+    return im;
+}
+
+/* By hand [IEC 61966-2-1]: 0.5 is ((0.5 + 0.055)/1.055)^2.4 = 0.21404, 0.25 is 0.05088, 0.03 is 0.03/12.92. Files keep steps of 1/255
+ * (1/65535, JPEG a little more), of which the curve is at most 2.3 times as steep. Alpha changes no colour: 0.25 at an alpha of 0.5
+ * is stored as 0.5. */
+TEST(colours_are_linear)
+{
+    static const char *const nothing[2] = {"assay:nothing", "1"};
+    static const char *const linear[2] = {"oiio:ColorSpace", "Linear"};
+    static const char *const gamma[2] = {"oiio:ColorSpace", "GammaCorrected1.8"};
+    static const struct {
+        const char *name, *channels, *colour, *const *attribute, *depth;
+        double expected[3], tolerance;
+    } cases[] = {
+        {"rgb.png", "3", "0.5,0.25,0.03", nothing, "uint8", {0.21404, 0.05088, 0.002322}, 5e-3},
+        {"rgb16.png", "3", "0.5,0.25,0.03", nothing, "uint16", {0.21404, 0.05088, 0.002322}, 3e-5},
+        {"rgba.png",
+         "4",
+         "0.25,0.125,0.015,0.5",
+         nothing,
+         "uint16",
+         {0.21404, 0.05088, 0.002322},
+         6e-5},
+        {"grey.png", "1", "0.5", nothing, "uint16", {0.21404, 0.21404, 0.21404}, 3e-5},
+        {"linear.png", "3", "0.5,0.25,0.03", linear, "uint16", {0.5, 0.25, 0.03}, 2e-5},
+        {"gamma.png", "3", "0.5,0.25,0.03", gamma, "uint16", {0.28717, 0.08247, 0.0018152}, 5e-5},
+        {"rgb.jpg", "3", "0.5,0.25,0.75", nothing, "uint8", {0.21404, 0.05088, 0.52252}, 2e-2},
+        {"rgb.tga", "3", "0.5,0.25,0.03", nothing, "uint8", {0.21404, 0.05088, 0.002322}, 5e-3},
+        {"rgb.exr", "3", "0.5,0.25,1.5", nothing, "float", {0.5, 0.25, 1.5}, 1e-6},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        struct image im = read_flat(cases[i].name, cases[i].channels, cases[i].colour,
+                                    cases[i].attribute, cases[i].depth);
+        for (int k = 0; k < 3 * 64; k++)
+            if (!(fabs((double)im.data[k] - cases[i].expected[k % 3]) <= cases[i].tolerance))
+                fail_msg("%s: %g, expected %g", cases[i].name, (double)im.data[k],
+                         cases[i].expected[k % 3]);
+        image_free(&im);
+    }
+    char path[256];
+    struct image im;
+    struct err e = {""};
+    REFUSES(image_read(path_of(path, "rgb.jpg"), &im, NULL, &e),
+            "not an OpenEXR, Radiance, PNG or PFM");
+}
+
+/* The place of every texel, among channels that are no colours. */
+TEST(colours_stay_where_they_are)
+{
+    char path[256];
+    struct err e = {""};
+    struct image im, source = make_image();
+    MUST(image_read_colours(path_of(path, "source.exr"), &im, &e));
+    assert_true(im.width == WIDTH && im.height == HEIGHT);
+    for (int i = 0; i < WIDTH * HEIGHT; i++)
+        assert_memory_equal(im.data + 3 * i, source.data + CHANNELS * i, 3 * sizeof(float));
+    image_free(&im);
+    image_free(&source);
+    static const char *const depth[] = {"--ch", "Z,variance.R,G", NULL};
+    oiiotool(depth, "depth.exr");
+    REFUSES(image_read_colours(path_of(path, "depth.exr"), &im, &e),
+            "depth.exr: no channels R, G and B");
+    REFUSES(image_read_colours(path_of(path, "none.png"), &im, &e),
+            "none.png: cannot read: No such file");
+}
+
+/* The head of a PNG says 9000 x 9000, which is more than a texture has. */
+TEST(textures_have_a_limit)
+{
+    uint8_t bytes[8 + 25 + 12] =
+        "\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\x23\x28\0\0\x23\x28\x08\x02\0\0\0";
+    char path[256];
+    struct image im;
+    struct err e = {""};
+    unsigned long check = crc32(0, bytes + 12, 17);
+    for (int i = 0; i < 4; i++)
+        bytes[29 + i] = (uint8_t)(check >> (24 - 8 * i));
+    memcpy(bytes + 33, "\0\0\0\0IDAT\x35\xaf\x06\x1e", 12);
+    FILE *f = fopen(path_of(path, "huge.png"), "wb");
+    assert_non_null(f);
+    assert_int_equal(fwrite(bytes, 1, sizeof bytes, f), sizeof bytes);
+    assert_int_equal(fclose(f), 0);
+    REFUSES(image_read_colours(path, &im, &e),
+            "9000 x 9000 pixels are more than the 67108864 of a texture");
 }
 
 static int setup(void **state)

@@ -117,6 +117,53 @@ static void spoil_reflectance_high(struct scene *s)
 {
     s->materials[0].reflectance.g = 1.01f;
 }
+/* A texture of one texel on the wall. */
+static void give_texture(struct scene *s, float texel)
+{
+    struct err e;
+    s->images = calloc(1, sizeof *s->images);
+    s->textures = calloc(1, sizeof *s->textures);
+    s->uv = calloc(12, sizeof *s->uv);
+    assert_true(s->images != NULL && s->textures != NULL && s->uv != NULL);
+    assert_true(image_alloc(s->images, 1, 1, 3, (const char *const[]){"R", "G", "B"}, &e));
+    s->images->data[1] = texel;
+    s->textures[0] = (struct texture){.width = 1, .height = 1, .texel = s->images->data};
+    s->num_images = s->num_textures = 1;
+    s->materials[0].reflectance_map = 1;
+}
+static void spoil_map(struct scene *s)
+{
+    s->materials[0].reflectance_map = 1;
+}
+static void spoil_texel_high(struct scene *s)
+{
+    give_texture(s, 2.01f);
+}
+static void spoil_texel_nan(struct scene *s)
+{
+    give_texture(s, NAN);
+}
+static void spoil_map_of_mirror(struct scene *s)
+{
+    give_texture(s, 1);
+    s->materials[0].kind = MATERIAL_MIRROR;
+}
+static void spoil_map_on_sphere(struct scene *s)
+{
+    give_texture(s, 1);
+    s->materials[1].radiance_map = 1;
+}
+static void spoil_map_radiance(struct scene *s)
+{
+    give_texture(s, -0.1f);
+    s->materials[0].reflectance_map = 0;
+    s->materials[1].radiance_map = 1;
+}
+static void spoil_uv(struct scene *s)
+{
+    give_texture(s, 1);
+    s->uv[7].v = 1.1e6f;
+}
 static void spoil_reflectance_negative(struct scene *s)
 {
     s->materials[0].reflectance.b = -0.01f;
@@ -202,6 +249,13 @@ TEST(bad_scenes_are_refused)
         {spoil_normal, "triangle 1: normal"},
         {spoil_reflectance_high, "'paint': reflectance"},
         {spoil_reflectance_negative, "'paint': reflectance"},
+        {spoil_map, "'paint': a texture that is not there"},
+        {spoil_texel_high, "'paint': reflectance outside [0,1] in its texture"},
+        {spoil_texel_nan, "'paint': reflectance outside"},
+        {spoil_map_of_mirror, "not diffuse"},
+        {spoil_map_on_sphere, "'bulbs': a texture on a sphere"},
+        {spoil_map_radiance, "'lamp': radiance negative or not finite in"},
+        {spoil_uv, "triangle 2: texture coordinate beyond"},
         {spoil_radiance, "'lamp': radiance"},
         {spoil_object_material, "'wall': no material 2"},
         {spoil_tri_material, "triangle 1: not the material"},

@@ -594,6 +594,97 @@ TEST(all_or_one_of_the_lights)
     scene_free(&s);
 }
 
+/* A rectangle over a plate whose halves glow in other colours, texel by texel (nearest), cut into strips of as many triangles as a
+ * lamp or a mesh has: Lambert's formula for each half. The plate is a ramp between two texels, seen where their mean is. */
+TEST(textured_lamp_over_textured_plate)
+{
+    const rgb halves[2] = {{1, 0, 2}, {3, 5, 0}},
+              ramp[2] = {{0.1f, 0.2f, 0.3f}, {0.9f, 0.4f, 0.5f}};
+    const float albedo[3] = {0.5f, 0.3f, 0.4f};
+    const double half[2] = {rectangle_irradiance(v3(-1, 1, -0.4f), 1.2f, 1),
+                            rectangle_irradiance(v3(0.2f, 1, -0.4f), 1.2f, 1)};
+    for (int many = 0; many < 2; many++) {
+        struct scene s = plate(v3(0, 1, 0), 1);
+        s.materials[0].reflectance_map = build_texture(&s, 2, 1, ramp, false, TEXTURE_CLAMP);
+        uint32_t lamp = build_material(&s, grey(0), grey(0.7f));
+        s.materials[lamp].radiance_map = build_texture(&s, 2, 1, halves, true, TEXTURE_WRAP);
+        const int strips = many ? 6 : 1;
+        const float depth = 1 / (float)strips;
+        for (int k = 0; k < strips; k++)
+            build_quad(&s, v3(-1, 1, -0.4f + depth * (float)k), v3(2.4f, 0, 0), v3(0, 0, depth),
+                       lamp);
+        s.num_objects = 2;
+        s.objects[1].num_triangles = 2 * (uint32_t)strips;
+        for (uint32_t t = 2; t < s.num_triangles; t++)
+            s.tri_object[t] = 1;
+        check_finish(&s);
+        for (int direct = DIRECT_HEMISPHERE; direct <= DIRECT_MIS; direct++)
+            for (int one = 0; one < 2; one++) {
+                struct integrator_options io = path_options;
+                io.direct = (enum direct_kind)direct;
+                io.many_lights = one ? LIGHTS_ONE : LIGHTS_ALL;
+                struct moments film = check_render(&s, io, 16, 16, 256);
+                const float value[2][3] = {{1, 0, 2}, {3, 5, 0}};
+                for (int c = 0; c < 3; c++) {
+                    double light =
+                        0.7 * (half[0] * (double)value[0][c] + half[1] * (double)value[1][c]);
+                    check_mean(&film, c, (double)albedo[c] / M_PI * light, "textures");
+                    double turned =
+                        0.7 * (half[1] * (double)value[0][c] + half[0] * (double)value[1][c]);
+                    assert_false(check_agrees(&film, c, (double)albedo[c] / M_PI * turned));
+                }
+                moments_free(&film);
+            }
+        scene_free(&s);
+    }
+}
+
+/* A textured lamp's triangles by the mean of their texels, a tenth by area: of four equal ones on texels of 0, 1, 3 and 4, whose mean
+ * is 2, so 0.1, 0.55, 1.45 and 1.9 of a quarter each; the sample's density is that of the place found again. */
+TEST(triangles_of_a_textured_lamp_by_mean)
+{
+    enum { STEPS = 4000 };
+    struct err e;
+    const rgb colours[4] = {{0, 0, 0}, {1, 1, 1}, {3, 3, 3}, {4, 4, 4}};
+    const double share[4] = {0.025, 0.1375, 0.3625, 0.475};
+    struct scene s = build_scene();
+    uint32_t m = build_material(&s, grey(0), grey(1));
+    s.materials[m].radiance_map = build_texture(&s, 4, 1, colours, true, TEXTURE_CLAMP);
+    for (int k = 0; k < 4; k++) {
+        build_triangle(&s, v3((float)k, 1, 0), v3((float)k + 1, 1, 0), v3((float)k, 1, 1), m);
+        s.tri_object[k] = 0;
+        for (int c = 0; c < 3; c++)
+            s.uv[3 * k + c] = (struct uv){0.25f * (float)k + 0.1f + 0.01f * (float)c, 0.5f};
+    }
+    s.num_objects = 1;
+    s.objects[0].num_triangles = 4;
+    build_camera(&s, v3(0, 0, 0), 40);
+    check_finish(&s);
+    struct light_table *t = light_table_build(&s, &e);
+    assert_non_null(t);
+    int count[4] = {0};
+    const vec3 from = v3(2, 0, 0);
+    for (int i = 0; i < STEPS; i++) {
+        const float u[4] = {0.3f, 0.4f, ((float)i + 0.5f) / STEPS, 0};
+        struct light_sample l = light_sample_direction(t, 0, from, u);
+        int k = l.pdf_w > 0 ? (int)floorf(from.x + l.wi.x * l.distance) : 0;
+        assert_in_range(k, 0, 3);
+        count[k]++;
+        if (k == 0)
+            continue;
+        const struct surface hit = {.ng = {0, -1, 0}};
+        double pdf_w = (double)light_pdf_w(t, 0, (uint32_t)k, from, l.wi, l.distance, &hit);
+        double d = (double)l.distance;
+        assert_near((double)l.pdf_w / pdf_w, 1, 1e-5);
+        assert_near(pdf_w * (2 / (4 * share[k])) / (d * d * d), 1, 1e-5);
+        assert_near(l.radiance.g, colours[k].g, 1e-6);
+    }
+    for (int k = 0; k < 4; k++)
+        assert_near(count[k], STEPS * share[k], 2);
+    light_table_free(t);
+    scene_free(&s);
+}
+
 /* One environment, on a finished scene too, and it is a light. */
 TEST(one_environment)
 {

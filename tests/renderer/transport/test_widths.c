@@ -121,6 +121,36 @@ static struct scene mesh_lamp(void)
     return s;
 }
 
+/* Textures of both kinds, on a floor and on lamps of two triangles and of many, all wraps, some texels black. */
+static struct scene textured(void)
+{
+    struct scene s = build_scene();
+    rgb colours[15];
+    for (int i = 0; i < 15; i++)
+        colours[i] = i % 4 == 1 ? grey(0) : (rgb){(float)i / 16, 0.5f, 1 - (float)i / 16};
+    for (int i = 0; i < 8; i++)
+        build_texture(&s, 5, 3, colours, i % 2 == 0, (enum texture_wrap)(i / 2));
+    add_room(&s, build_material(&s, (rgb){0.8f, 0.7f, 0.6f}, grey(0)));
+    s.materials[0].reflectance_map = 2;
+    s.materials[1].reflectance_map = 3;
+    build_uv(&s, 0, 3, (struct uv){-1.3f, -1.1f});
+    for (int i = 0; i < 6; i++) {
+        uint32_t lamp = build_material(&s, grey(0.4f), (rgb){4, 5, 6});
+        s.materials[lamp].radiance_map = 3 + (uint32_t)i;
+        s.materials[lamp].radiance_both_sides = i == 1;
+        uint32_t first = s.num_triangles;
+        for (int k = 0; k <= i; k++)
+            build_quad(&s, v3(-0.8f + 0.25f * (float)i, 0.4f + 0.1f * (float)k, -0.5f),
+                       v3(0.2f, 0, 0), v3(0, 0.1f, 0.05f), lamp);
+        build_uv(&s, first, 1 + (float)i, (struct uv){0.2f, -0.1f});
+        for (uint32_t t = first; t < s.num_triangles; t++)
+            s.tri_object[t] = s.num_objects - 1 - (uint32_t)i;
+        s.num_objects -= (uint32_t)i;
+        s.objects[s.num_objects - 1].num_triangles = s.num_triangles - first;
+    }
+    return s;
+}
+
 struct how {
     struct integrator_options opt;
     float lens;
@@ -221,8 +251,8 @@ static void complete(struct scene *s, bool image)
 
 TEST(bits_are_those_of_one_lane)
 {
-    struct scene (*const make[])(void) = {all_kinds, many_lamps, mesh_lamp};
-    for (int which = 0; which < 6; which++) {
+    struct scene (*const make[])(void) = {all_kinds, many_lamps, mesh_lamp, textured};
+    for (int which = 0; which < 8; which++) {
         struct scene s = make[which / 2]();
         complete(&s, which % 2);
         for (int direct = DIRECT_HEMISPHERE; direct <= DIRECT_MIS; direct++)
