@@ -218,8 +218,17 @@ static void add_note(struct loader *ld, const char *text)
     snprintf(note + n, sizeof ld->scene.note - n, "%s%s", n > 0 ? "; " : "", text);
 }
 
-static void note_dialect(struct loader *ld)
+static void write_notes(struct loader *ld)
 {
+    static const char *const LEFT_OUT[NUM_LEFT_OUT] = {
+        "%u animations, controllers or bodies are left out: a still image shows where things stand",
+        "%u groups of lines are left out"};
+    for (int i = 0; i < NUM_LEFT_OUT; i++) {
+        char text[128];
+        snprintf(text, sizeof text, LEFT_OUT[i], ld->num_left_out[i]);
+        if (ld->num_left_out[i] > 0)
+            add_note(ld, text);
+    }
     if (ld->is_course_export)
         add_note(ld, "written by Blender 2.72 or 2.74, so read as a scene of CS184 (--dialect "
                      "collada: as any other file)");
@@ -227,10 +236,15 @@ static void note_dialect(struct loader *ld)
         add_note(ld, "specular terms are left out, as the assignment does");
 }
 
-/* Libraries that hold nothing are common in exported files; otherwise the file means to do
- * something that would be missing from the image. */
+/* What moves is counted, as a still image shows where it stands; other libraries may only be empty,
+ * as exporters leave them. */
 static bool check_libraries(struct loader *ld, const xmlNode *root)
 {
+    static const char MOVING[] =
+        "library_animations library_animation_clips library_controllers library_formulas "
+        "library_force_fields library_physics_materials library_physics_models "
+        "library_physics_scenes library_joints library_kinematics_models "
+        "library_kinematics_scenes library_articulated_systems";
     for (const xmlNode *c = element_first_child(root); c != NULL; c = element_next_sibling(c)) {
         if (element_is_one_of(c,
                               "asset scene extra library_cameras library_lights library_images "
@@ -241,7 +255,11 @@ static bool check_libraries(struct loader *ld, const xmlNode *root)
             return element_fail_unexpected(ld, c);
         for (const xmlNode *item = element_first_child(c); item != NULL;
              item = element_next_sibling(item))
-            if (!element_is_one_of(item, "asset extra"))
+            if (element_is_one_of(item, "asset extra"))
+                continue;
+            else if (element_is_one_of(c, MOVING))
+                ld->num_left_out[LEFT_OUT_MOVING]++;
+            else
                 return fail_at(ld, item, "<%.60s> in <%.60s> is not supported",
                                (const char *)item->name, (const char *)c->name);
     }
@@ -255,7 +273,9 @@ static bool find_visual_scene(struct loader *ld, const xmlNode *root, const xmlN
         return false;
     if (scene == NULL)
         return fail_at(ld, root, "no <scene>");
-    if (!element_only_children(ld, scene, "instance_visual_scene extra") ||
+    if (!element_only_children(ld, scene,
+                               "instance_visual_scene instance_physics_scene "
+                               "instance_kinematics_scene extra") ||
         !element_one_child(ld, scene, "instance_visual_scene", &instance))
         return false;
     if (instance == NULL)
@@ -278,9 +298,12 @@ static bool read_scene(struct loader *ld)
     for (const xmlNode *c = element_first_child(visual); c != NULL; c = element_next_sibling(c))
         if (element_is(c, "node") && !walk(ld, c, &top))
             return false;
+    if (!light_finish(ld))
+        return false;
     if (scene_num_primitives(&ld->scene) == 0)
         return fail_at(ld, visual, "nothing to render: no triangles, no spheres");
     ld->scene.dialect = ld->dialect;
+    write_notes(ld);
     if (ld->dialect == DIALECT_COLLADA)
         return scene_finish(&ld->scene, ld->path, ld->err);
     if (!ld->scene.camera.present)
@@ -289,7 +312,6 @@ static bool read_scene(struct loader *ld)
     vec3 lo, hi;
     bool has_frame = build_find_bounds(ld, false, &lo, &hi);
     build_drop_twin_lamps(ld);
-    note_dialect(ld);
     if (!scene_finish(&ld->scene, ld->path, ld->err))
         return false;
     if (has_frame) {

@@ -10,109 +10,54 @@ struct material_tag {
     bool (*read)(struct loader *ld, const xmlNode *tag, struct material *m);
 };
 
+#define IOR   "ior", FIELD_FLOAT, &m->ior, true, .lo = (double)(1 / MAX_IOR), .hi = MAX_IOR
+#define ALPHA "alpha", FIELD_FLOAT, &m->alpha, true, .lo = (double)MICROFACET_MIN_ALPHA, .hi = 10
+
 /* The assignment's emitter shines to both sides and reflects nothing. */
 static bool read_cgl_emission(struct loader *ld, const xmlNode *tag, struct material *m)
 {
-    xmlNode *radiance;
-    if (!element_only_children(ld, tag, "radiance") ||
-        !element_one_child(ld, tag, "radiance", &radiance))
-        return false;
-    if (radiance == NULL)
-        return fail_at(ld, tag, "<emission> without <radiance>");
     m->reflectance = grey(0);
     m->radiance_both_sides = true;
-    return text_read_color(ld, radiance, &m->radiance, NULL);
+    return field_read_all(ld, tag, FIELDS({FIELD_OF_COLOR("radiance", &m->radiance, 0)}));
 }
 
 /* Ours adds to the reflection of profile_COMMON, which is in *m already. */
 static bool read_assay_emission(struct loader *ld, const xmlNode *tag, struct material *m)
 {
-    xmlNode *radiance, *sides;
-    double n;
     if (!rgb_is_zero(m->radiance))
         return fail_at(ld, tag, "<emission> here and in profile_COMMON: give one");
-    if (!element_only_children(ld, tag, "radiance sides") ||
-        !element_one_child(ld, tag, "radiance", &radiance) ||
-        !element_one_child(ld, tag, "sides", &sides))
-        return false;
-    if (radiance == NULL || sides == NULL)
-        return fail_at(ld, tag, "<emission> needs <radiance> and <sides>");
-    if (!text_read_color(ld, radiance, &m->radiance, NULL) || !text_read_exactly(ld, sides, &n, 1))
-        return false;
-    if (n != 1 && n != 2)
-        return fail_at(ld, sides, "<sides> is 1 or 2, not %g", n);
-    m->radiance_both_sides = n == 2;
-    return true;
-}
-
-/* A required child with a colour whose parts are at most `most`. */
-static bool read_factor(struct loader *ld, const xmlNode *tag, const char *name, float most,
-                        rgb *out)
-{
-    xmlNode *n;
-    if (!element_one_child(ld, tag, name, &n))
-        return false;
-    if (n == NULL)
-        return fail_at(ld, tag, "<%s> without <%s>", (const char *)tag->name, name);
-    if (!text_read_color(ld, n, out, NULL))
-        return false;
-    return rgb_max(*out) <= most || fail_at(ld, n, "<%s> above %g", name, (double)most);
-}
-
-/* A required child with one number from lo to hi. */
-static bool read_number(struct loader *ld, const xmlNode *tag, const char *name, float lo, float hi,
-                        float *out)
-{
-    xmlNode *n;
-    double v;
-    if (!element_one_child(ld, tag, name, &n))
-        return false;
-    if (n == NULL)
-        return fail_at(ld, tag, "<%s> without <%s>", (const char *)tag->name, name);
-    if (!text_read_exactly(ld, n, &v, 1))
-        return false;
-    /* Compared as what will be stored: 0.0001 is not the same number in both precisions. */
-    *out = fabs(v) <= (double)hi ? (float)v : INFINITY;
-    return (*out >= lo && *out <= hi) ||
-           fail_at(ld, n, "<%s> is %g, outside %g to %g", name, v, (double)lo, (double)hi);
-}
-
-/* The assignment's files carry a <roughness> that nothing uses; another than 0 would mean something. */
-static bool no_roughness(struct loader *ld, const xmlNode *tag)
-{
-    xmlNode *n;
-    double v;
-    if (!element_one_child(ld, tag, "roughness", &n))
-        return false;
-    if (n == NULL)
-        return true;
-    return text_read_exactly(ld, n, &v, 1) &&
-           (v == 0 || fail_at(ld, n, "rough %s is not supported", (const char *)tag->name));
+    return field_read_all(
+        ld, tag,
+        FIELDS({FIELD_OF_COLOR("radiance", &m->radiance, 0)},
+               {"sides", FIELD_CHOICE, &m->radiance_both_sides, true, .words = {"1", "2"}}));
 }
 
 static bool read_mirror(struct loader *ld, const xmlNode *tag, struct material *m)
 {
     m->kind = MATERIAL_MIRROR;
-    return element_only_children(ld, tag, "reflectance") &&
-           read_factor(ld, tag, "reflectance", 1, &m->reflectance);
+    return field_read_all(ld, tag, FIELDS({FIELD_OF_COLOR("reflectance", &m->reflectance, 1)}));
 }
 
+/* Smooth only. The assignment's files carry a <roughness> that nothing uses; another than 0 would
+ * mean something. */
 static bool read_refraction(struct loader *ld, const xmlNode *tag, struct material *m)
 {
+    double roughness;
     m->kind = MATERIAL_REFRACTION;
     m->reflectance = grey(0);
-    return element_only_children(ld, tag, "transmittance roughness ior") && no_roughness(ld, tag) &&
-           read_factor(ld, tag, "transmittance", 1, &m->transmittance) &&
-           read_number(ld, tag, "ior", 1 / MAX_IOR, MAX_IOR, &m->ior);
+    return field_read_all(ld, tag,
+                          FIELDS({FIELD_OF_COLOR("transmittance", &m->transmittance, 1)}, {IOR},
+                                 {"roughness", FIELD_NUMBER, &roughness, .lo = 0, .hi = 0}));
 }
 
 static bool read_glass(struct loader *ld, const xmlNode *tag, struct material *m)
 {
+    double roughness;
     m->kind = MATERIAL_GLASS;
-    return element_only_children(ld, tag, "transmittance reflectance roughness ior") &&
-           no_roughness(ld, tag) && read_factor(ld, tag, "transmittance", 1, &m->transmittance) &&
-           read_factor(ld, tag, "reflectance", 1, &m->reflectance) &&
-           read_number(ld, tag, "ior", 1 / MAX_IOR, MAX_IOR, &m->ior);
+    return field_read_all(ld, tag,
+                          FIELDS({FIELD_OF_COLOR("transmittance", &m->transmittance, 1)},
+                                 {FIELD_OF_COLOR("reflectance", &m->reflectance, 1)}, {IOR},
+                                 {"roughness", FIELD_NUMBER, &roughness, .lo = 0, .hi = 0}));
 }
 
 /* The assignment's conductor: Beckmann, heights correlated, Fresnel by eta and k. */
@@ -122,48 +67,31 @@ static bool read_cgl_microfacet(struct loader *ld, const xmlNode *tag, struct ma
     m->microfacet = MICROFACET_BECKMANN;
     m->conductor = true;
     m->reflectance = grey(0);
-    return element_only_children(ld, tag, "alpha eta k") &&
-           read_number(ld, tag, "alpha", MICROFACET_MIN_ALPHA, 10, &m->alpha) &&
-           read_factor(ld, tag, "eta", 1000, &m->eta) && read_factor(ld, tag, "k", 1000, &m->k);
-}
-
-/* One of two words in a child; the first where the child is missing. */
-static bool read_choice(struct loader *ld, const xmlNode *tag, const char *name, const char *first,
-                        const char *second, bool *is_second)
-{
-    xmlNode *n;
-    if (!element_one_child(ld, tag, name, &n))
-        return false;
-    *is_second = false;
-    if (n == NULL)
-        return true;
-    char *word = text_read_word(ld, n);
-    if (word == NULL)
-        return false;
-    *is_second = strcmp(word, second) == 0;
-    bool ok = *is_second || strcmp(word, first) == 0 ||
-              fail_at(ld, n, "<%s> is '%.60s', neither '%s' nor '%s'", name, word, first, second);
-    free(word);
-    return ok;
+    return field_read_all(ld, tag,
+                          FIELDS({ALPHA}, {FIELD_OF_COLOR("eta", &m->eta, 1000)},
+                                 {FIELD_OF_COLOR("k", &m->k, 1000)}));
 }
 
 static bool read_assay_microfacet(struct loader *ld, const xmlNode *tag, struct material *m)
 {
-    bool beckmann;
+    bool beckmann = false;
+    const struct field distribution = {"distribution", FIELD_CHOICE, &beckmann,
+                                       .words = {"ggx", "beckmann"}},
+                       shadowing = {"shadowing", FIELD_CHOICE, &m->separable,
+                                    .words = {"correlated", "separable"}};
     m->kind = MATERIAL_MICROFACET;
     m->reflectance = grey(0);
     m->conductor = element_child_named(tag, "reflectance") == NULL;
-    if (!element_only_children(ld, tag,
-                               m->conductor ? "distribution shadowing alpha eta k"
-                                            : "distribution shadowing alpha reflectance") ||
-        !read_choice(ld, tag, "distribution", "ggx", "beckmann", &beckmann) ||
-        !read_choice(ld, tag, "shadowing", "correlated", "separable", &m->separable) ||
-        !read_number(ld, tag, "alpha", MICROFACET_MIN_ALPHA, 10, &m->alpha))
-        return false;
+    bool ok = m->conductor
+                  ? field_read_all(ld, tag,
+                                   FIELDS(distribution, shadowing, {ALPHA},
+                                          {FIELD_OF_COLOR("eta", &m->eta, 1000)},
+                                          {FIELD_OF_COLOR("k", &m->k, 1000)}))
+                  : field_read_all(ld, tag,
+                                   FIELDS(distribution, shadowing, {ALPHA},
+                                          {FIELD_OF_COLOR("reflectance", &m->reflectance, 1)}));
     m->microfacet = beckmann ? MICROFACET_BECKMANN : MICROFACET_GGX;
-    if (!m->conductor)
-        return read_factor(ld, tag, "reflectance", 1, &m->reflectance);
-    return read_factor(ld, tag, "eta", 1000, &m->eta) && read_factor(ld, tag, "k", 1000, &m->k);
+    return ok;
 }
 
 static const struct material_tag TAGS[] = {

@@ -67,6 +67,9 @@ struct material_slot {
     uint32_t index;
 };
 
+/* What is in a file and not in a still image of surfaces: counted for the note. */
+enum left_out { LEFT_OUT_MOVING, LEFT_OUT_LINES, NUM_LEFT_OUT };
+
 struct loader {
     const char *path;
     struct err *err;
@@ -74,6 +77,7 @@ struct loader {
     enum dialect dialect;
     bool is_course_export; /* taken for a file of the assignment by the program that wrote it */
     unsigned num_specular; /* materials in use whose highlight the dialect leaves out */
+    unsigned num_left_out[NUM_LEFT_OUT];
     const xmlNode *instance_effect; /* of the material that is being read */
     xmlDoc *doc;
     struct id_entry *ids; /* sorted by id */
@@ -86,6 +90,7 @@ struct loader {
     bool *is_lamp; /* per object: it came from a light element */
     size_t num_nodes;
     unsigned num_cameras;
+    rgb ambient;        /* of all ambient lights */
     struct scene scene; /* under construction; num_* are also the array sizes in use */
     size_t cap_triangles, cap_spheres, cap_materials, cap_lights, cap_objects;
 };
@@ -168,6 +173,25 @@ bool text_read_up_to(struct loader *ld, const xmlNode *n, double *out, size_t mo
 bool text_read_color(struct loader *ld, const xmlNode *n, rgb *out, double *alpha);
 /* The element's text without blanks around it; the caller frees. NULL: failed. */
 char *text_read_word(struct loader *ld, const xmlNode *n);
+
+/* collada_field.c */
+
+/* A child element that a reader knows. `out` stays as it is where the element is missing. */
+struct field {
+    const char *name;
+    enum { FIELD_NUMBER, FIELD_FLOAT, FIELD_COLOR, FIELD_CHOICE } kind;
+    void *out; /* double, float, rgb, or bool: is it the second of two words? */
+    bool is_needed;
+    double lo, hi; /* what a number may be; no part of a colour is above hi, unless hi is 0 */
+    const char *words[2];
+};
+#define FIELDS(...)                                                                                \
+    (const struct field[]){__VA_ARGS__},                                                           \
+        sizeof((const struct field[]){__VA_ARGS__}) / sizeof(struct field)
+/* One that has to be there. */
+#define FIELD_OF_COLOR(name, out, most) name, FIELD_COLOR, out, true, .hi = (most)
+/* Reads all children of n, which are those fields in any order, each once at most. */
+bool field_read_all(struct loader *ld, const xmlNode *n, const struct field *fields, size_t count);
 
 /* collada_parameter.c */
 
@@ -256,6 +280,8 @@ bool material_get(struct loader *ld, const xmlNode *instance, const xmlNode *use
 /* collada_light.c */
 bool light_instance(struct loader *ld, const xmlNode *instance, const xmlNode *light,
                     const char *node_name, const mat4 *m);
+/* What all ambient lights give together becomes the environment. */
+bool light_finish(struct loader *ld);
 bool camera_instance(struct loader *ld, const xmlNode *instance, const xmlNode *camera,
                      const mat4 *m);
 /* What the assignment uses for a file without a camera. */

@@ -7,63 +7,27 @@
 
 static const double DEGREE = 3.14159265358979323846 / 180;
 
+#define LENGTH(name, out, needed) name, FIELD_NUMBER, out, needed, .lo = 1e-300, .hi = 1e300
+
 static vec3 to_float(dvec3 v)
 {
     return v3((float)v.x, (float)v.y, (float)v.z);
 }
 
-static bool required_color(struct loader *ld, const xmlNode *n, const char *name, rgb *out)
-{
-    xmlNode *color;
-    if (!element_one_child(ld, n, name, &color))
-        return false;
-    if (color == NULL)
-        return fail_at(ld, n, "<%.60s> without <%s>", (const char *)n->name, name);
-    return text_read_color(ld, color, out, NULL);
-}
-
-/* A missing number is 0 and *given false. */
-static bool optional_number(struct loader *ld, const xmlNode *n, const char *name, bool *given,
-                            double *out)
-{
-    xmlNode *c;
-    *out = 0;
-    if (!element_one_child(ld, n, name, &c))
-        return false;
-    *given = c != NULL;
-    return c == NULL || text_read_exactly(ld, c, out, 1);
-}
-
-static bool required_positive(struct loader *ld, const xmlNode *n, const char *name, double *out)
-{
-    bool given;
-    if (!optional_number(ld, n, name, &given, out))
-        return false;
-    if (!given)
-        return fail_at(ld, n, "<%.60s> without <%s>", (const char *)n->name, name);
-    if (!(*out > 0))
-        return fail_at(ld, element_child_named(n, name), "<%s> must be positive, not %g", name,
-                       *out);
-    return true;
-}
-
-/* Attenuation over metres. Pure inverse-square falloff is brought to the physical form {0, 0, 1},
- * where the value is an intensity. */
-static bool read_attenuation(struct loader *ld, const xmlNode *n, struct light *l)
-{
-    static const char *const NAMES[3] = {"constant_attenuation", "linear_attenuation",
-                                         "quadratic_attenuation"};
-    double a[3];
-    for (int i = 0; i < 3; i++) {
-        bool given;
-        if (!optional_number(ld, n, NAMES[i], &given, &a[i]))
-            return false;
-        if (!given && i == 0)
-            a[i] = 1;
-        if (!(a[i] >= 0))
-            return fail_at(ld, element_child_named(n, NAMES[i]), "<%s> is negative", NAMES[i]);
-        a[i] /= i == 0 ? 1 : i == 1 ? ld->unit : ld->unit * ld->unit;
+/* The attenuation of the light as the file has it. */
+#define ATTENUATION(a)                                                                             \
+    {"constant_attenuation", FIELD_NUMBER, &(a)[0], .hi = 1e300},                                \
+        {"linear_attenuation", FIELD_NUMBER, &(a)[1], .hi = 1e300},                              \
+    {                                                                                              \
+        "quadratic_attenuation", FIELD_NUMBER, &(a)[2], .hi = 1e300                              \
     }
+
+/* To attenuation over metres. Pure inverse-square falloff is brought to the physical form {0, 0, 1},
+ * where the value is an intensity. */
+static bool set_attenuation(struct loader *ld, const xmlNode *n, double a[3], struct light *l)
+{
+    a[1] /= ld->unit;
+    a[2] /= ld->unit * ld->unit;
     if (a[0] + a[1] + a[2] == 0)
         return fail_at(ld, n, "all attenuations of the light are 0");
     if (!(a[0] + a[1] + a[2] <= FLT_MAX) || (a[0] == 0 && a[1] == 0 && !(1 / a[2] <= FLT_MAX)))
@@ -86,45 +50,33 @@ static bool place_light(struct loader *ld, const xmlNode *n, const mat4 *m, stru
     return true;
 }
 
-static bool add_point(struct loader *ld, const xmlNode *n, const mat4 *m)
+static bool add_point(struct loader *ld, const xmlNode *n, const char *name, const mat4 *m)
 {
     struct light l = {.kind = LIGHT_POINT, .attenuation = {1, 0, 0}};
-    if (!element_only_children(
-            ld, n, "color constant_attenuation linear_attenuation quadratic_attenuation") ||
-        !required_color(ld, n, "color", &l.value))
-        return false;
+    double a[3] = {1, 0, 0};
+    (void)name;
     /* The assignment's point lights do not fall off, whatever the file says. */
-    if (ld->dialect == DIALECT_COLLADA && !read_attenuation(ld, n, &l))
-        return false;
-    return place_light(ld, n, m, &l) && build_add_light(ld, &l);
+    return field_read_all(ld, n, FIELDS({FIELD_OF_COLOR("color", &l.value, 0)}, ATTENUATION(a))) &&
+           (ld->dialect == DIALECT_CGL || set_attenuation(ld, n, a, &l)) &&
+           place_light(ld, n, m, &l) && build_add_light(ld, &l);
 }
 
 /* A point light with a cone around its -Z. */
-static bool add_spot(struct loader *ld, const xmlNode *n, const mat4 *m)
+static bool add_spot(struct loader *ld, const xmlNode *n, const char *name, const mat4 *m)
 {
     struct light l = {.kind = LIGHT_SPOT};
-    bool given;
-    double angle, exponent;
+    double a[3] = {1, 0, 0}, angle = 180;
+    (void)name;
     if (ld->dialect == DIALECT_CGL)
         return fail_at(ld, n, "spot lights of the assignment are not supported: they never shone");
-    if (!element_only_children(
+    if (!field_read_all(
             ld, n,
-            "color constant_attenuation linear_attenuation quadratic_attenuation "
-            "falloff_angle falloff_exponent") ||
-        !required_color(ld, n, "color", &l.value) || !read_attenuation(ld, n, &l) ||
-        !optional_number(ld, n, "falloff_exponent", &given, &exponent) ||
-        !optional_number(ld, n, "falloff_angle", &given, &angle))
+            FIELDS({FIELD_OF_COLOR("color", &l.value, 0)}, ATTENUATION(a),
+                   {"falloff_angle", FIELD_NUMBER, &angle, .lo = 0.1, .hi = 180},
+                   {"falloff_exponent", FIELD_FLOAT, &l.exponent, .lo = 0, .hi = 1e6})) ||
+        !set_attenuation(ld, n, a, &l))
         return false;
-    if (!given)
-        angle = 180;
-    if (!(angle >= 0.1 && angle <= 180))
-        return fail_at(ld, element_child_named(n, "falloff_angle"),
-                       "<falloff_angle> of %g degrees is not between 0.1 and 180", angle);
-    if (!(exponent >= 0 && exponent <= 1e6))
-        return fail_at(ld, element_child_named(n, "falloff_exponent"),
-                       "<falloff_exponent> of %g is not between 0 and 1e6", exponent);
     l.cos_cutoff = angle < 180 ? (float)cos(0.5 * angle * DEGREE) : 0;
-    l.exponent = (float)exponent;
     dvec3 backward = mat4_column(m, 2);
     if (!d3_normalize(&backward))
         return fail_at(ld, n, "the light has no direction");
@@ -132,10 +84,11 @@ static bool add_spot(struct loader *ld, const xmlNode *n, const mat4 *m)
     return place_light(ld, n, m, &l) && build_add_light(ld, &l);
 }
 
-static bool add_directional(struct loader *ld, const xmlNode *n, const mat4 *m)
+static bool add_directional(struct loader *ld, const xmlNode *n, const char *name, const mat4 *m)
 {
     struct light l = {.kind = LIGHT_DIRECTIONAL};
-    if (!element_only_children(ld, n, "color") || !required_color(ld, n, "color", &l.value))
+    (void)name;
+    if (!field_read_all(ld, n, FIELDS({FIELD_OF_COLOR("color", &l.value, 0)})))
         return false;
     /* It shines along its -Z. The assignment takes the point (0,0,-1) with the translation for the
      * direction towards the light. */
@@ -148,8 +101,8 @@ static bool add_directional(struct loader *ld, const xmlNode *n, const mat4 *m)
 
 /* A rectangle that emits to its -Z side is geometry: so what light sampling aims at and what a ray
  * hits are the same thing. */
-static bool add_rectangle(struct loader *ld, const xmlNode *n, const char *name, const mat4 *m,
-                          double width, double height, rgb radiance)
+static bool add_lamp(struct loader *ld, const xmlNode *n, const char *name, const mat4 *m,
+                     double width, double height, rgb radiance)
 {
     struct material lamp = {.kind = MATERIAL_DIFFUSE, .radiance = radiance};
     uint32_t material;
@@ -171,99 +124,104 @@ static bool add_rectangle(struct loader *ld, const xmlNode *n, const char *name,
     return true;
 }
 
-static bool add_ambient(struct loader *ld, const xmlNode *n)
+static bool add_rectangle(struct loader *ld, const xmlNode *n, const char *name, const mat4 *m)
+{
+    double width, height;
+    rgb radiance;
+    return field_read_all(ld, n,
+                          FIELDS({FIELD_OF_COLOR("radiance", &radiance, 0)},
+                                 {LENGTH("width", &width, true)},
+                                 {LENGTH("height", &height, true)})) &&
+           add_lamp(ld, n, name, m, width, height, radiance);
+}
+
+static bool add_area(struct loader *ld, const xmlNode *n, const char *name, const mat4 *m)
+{
+    rgb radiance;
+    return field_read_all(ld, n, FIELDS({FIELD_OF_COLOR("color", &radiance, 0)})) &&
+           add_lamp(ld, n, name, m, 1, 1, radiance);
+}
+
+static bool add_ambient(struct loader *ld, const xmlNode *n, const char *name, const mat4 *m)
+{
+    rgb color;
+    (void)name;
+    (void)m;
+    if (!field_read_all(ld, n, FIELDS({FIELD_OF_COLOR("color", &color, 0)})))
+        return false;
+    ld->ambient = rgb_add(ld->ambient, color);
+    return true;
+}
+
+bool light_finish(struct loader *ld)
 {
     struct light l = {.kind = LIGHT_ENVIRONMENT};
-    rgb color;
-    if (!element_only_children(ld, n, "color") || !required_color(ld, n, "color", &color))
-        return false;
-    if (rgb_is_zero(color))
+    if (rgb_is_zero(ld->ambient))
         return true;
-    if (ld->scene.environment != NULL)
-        return fail_at(ld, n, "a second ambient light");
-    ld->scene.environment = ld->dialect == DIALECT_CGL ? environment_upper_half(color, ld->err)
-                                                       : environment_constant(color, ld->err);
+    ld->scene.environment = ld->dialect == DIALECT_CGL
+                                ? environment_upper_half(ld->ambient, ld->err)
+                                : environment_constant(ld->ambient, ld->err);
     return ld->scene.environment != NULL ? build_add_light(ld, &l) : fail_memory(ld);
 }
+
+/* To support one more, give it a reader here. A technique of no profile is <technique_common>. */
+static const struct light_tag {
+    const char *profiles, *name;
+    bool (*add)(struct loader *ld, const xmlNode *n, const char *name, const mat4 *m);
+} LIGHT_TAGS[] = {
+    {"ASSAY", "rectangle", add_rectangle},  {"CGL", "area", add_area},
+    {"CGL common", "point", add_point},     {"CGL common", "directional", add_directional},
+    {"CGL common", "ambient", add_ambient}, {"CGL common", "spot", add_spot},
+};
 
 bool light_instance(struct loader *ld, const xmlNode *instance, const xmlNode *light,
                     const char *node_name, const mat4 *m)
 {
     xmlNode *technique, *common, *kind;
-    rgb radiance;
-    double sign, width, height;
+    double sign;
     if (!element_only_children(ld, instance, "extra") ||
         !element_only_children(ld, light, "asset technique_common technique extra") ||
         !build_transform_sign(ld, instance, m, &sign) ||
-        !element_own_technique(ld, light, &technique))
+        !element_own_technique(ld, light, &technique) ||
+        !element_one_child(ld, light, "technique_common", &common))
         return false;
-    bool is_assay =
-        technique != NULL && strcmp(element_attribute(technique, "profile"), "ASSAY") == 0;
-    if (technique == NULL) {
-        if (!element_one_child(ld, light, "technique_common", &common))
-            return false;
-        if (common == NULL)
-            return fail_at(ld, light, "<light> without <technique_common>");
-        technique = common;
-    }
+    const char *profile = technique != NULL ? element_attribute(technique, "profile") : "common";
+    technique = technique != NULL ? technique : common;
+    if (technique == NULL)
+        return fail_at(ld, light, "<light> without <technique_common>");
     kind = element_first_child(technique);
     if (kind == NULL)
         return fail_at(ld, technique, "<light> without a kind");
     if (element_next_sibling(kind) != NULL)
         return element_fail_unexpected(ld, element_next_sibling(kind));
-    bool is_common = element_is(technique, "technique_common");
-    if (is_assay && element_is(kind, "rectangle"))
-        return element_only_children(ld, kind, "radiance width height") &&
-               required_color(ld, kind, "radiance", &radiance) &&
-               required_positive(ld, kind, "width", &width) &&
-               required_positive(ld, kind, "height", &height) &&
-               add_rectangle(ld, kind, node_name, m, width, height, radiance);
-    if (!is_assay && !is_common && element_is(kind, "area"))
-        return element_only_children(ld, kind, "color") &&
-               required_color(ld, kind, "color", &radiance) &&
-               add_rectangle(ld, kind, node_name, m, 1, 1, radiance);
-    if (!is_assay && element_is(kind, "point"))
-        return add_point(ld, kind, m);
-    if (!is_assay && element_is(kind, "directional"))
-        return add_directional(ld, kind, m);
-    if (!is_assay && element_is(kind, "ambient"))
-        return add_ambient(ld, kind);
-    if (!is_assay && element_is(kind, "spot"))
-        return add_spot(ld, kind, m);
+    for (size_t i = 0; i < sizeof LIGHT_TAGS / sizeof *LIGHT_TAGS; i++)
+        if (element_is(kind, LIGHT_TAGS[i].name) && strstr(LIGHT_TAGS[i].profiles, profile) != NULL)
+            return LIGHT_TAGS[i].add(ld, kind, node_name, m);
     return fail_at(ld, kind, "unknown light tag '%.60s'", (const char *)kind->name);
 }
 
-static bool read_angle(struct loader *ld, const xmlNode *n, const char *name, float *out)
+static bool set_clipping(struct loader *ld, const xmlNode *n, double near, double far,
+                         struct scene_camera *c)
 {
-    bool given;
-    double degrees;
-    *out = 0;
-    if (!optional_number(ld, n, name, &given, &degrees))
-        return false;
-    if (!given)
-        return true;
-    if (!(degrees > 0 && degrees < 180))
-        return fail_at(ld, element_child_named(n, name),
-                       "<%s> of %g degrees is not between 0 and 180", name, degrees);
-    *out = (float)(degrees * DEGREE);
+    if (!(far > near) || !(far * ld->unit <= FARTHEST))
+        return fail_at(ld, n, "<zfar> is not beyond <znear>, or something is out of range");
+    c->near = (float)(near * ld->unit);
+    c->far = (float)(far * ld->unit);
     return true;
 }
 
 static bool read_perspective(struct loader *ld, const xmlNode *n, struct scene_camera *c)
 {
-    bool given;
-    double near, far, aspect;
-    if (!element_only_children(ld, n, "xfov yfov aspect_ratio znear zfar") ||
-        !read_angle(ld, n, "xfov", &c->hfov) || !read_angle(ld, n, "yfov", &c->vfov) ||
-        !optional_number(ld, n, "aspect_ratio", &given, &aspect) ||
-        (given && !required_positive(ld, n, "aspect_ratio", &aspect)) ||
-        !required_positive(ld, n, "znear", &near) || !required_positive(ld, n, "zfar", &far))
+    double near, far, aspect = 0, x = 0, y = 0;
+    if (!field_read_all(ld, n,
+                        FIELDS({"xfov", FIELD_NUMBER, &x, .lo = 1e-6, .hi = 179.9999},
+                               {"yfov", FIELD_NUMBER, &y, .lo = 1e-6, .hi = 179.9999},
+                               {"aspect_ratio", FIELD_NUMBER, &aspect, .lo = 1e-6, .hi = 1e6},
+                               {LENGTH("znear", &near, true)}, {LENGTH("zfar", &far, true)})))
         return false;
-    if (!(far > near) || !(far * ld->unit <= FARTHEST) || aspect > 1e6)
-        return fail_at(ld, n, "<zfar> is not beyond <znear>, or something is out of range");
+    c->hfov = (float)(x * DEGREE);
+    c->vfov = (float)(y * DEGREE);
     c->aspect = (float)aspect;
-    c->near = (float)(near * ld->unit);
-    c->far = (float)(far * ld->unit);
     if (ld->dialect == DIALECT_CGL) {
         if (c->hfov == 0)
             c->hfov = (float)(50 * DEGREE);
@@ -274,7 +232,7 @@ static bool read_perspective(struct loader *ld, const xmlNode *n, struct scene_c
     }
     if (c->hfov == 0 && c->vfov == 0)
         return fail_at(ld, n, "<perspective> needs <xfov> or <yfov>");
-    return true;
+    return set_clipping(ld, n, near, far, c);
 }
 
 /* The assignment looks at the scene from the direction c, with world +Y up; straight from above or

@@ -68,18 +68,55 @@ static bool read_corner(struct loader *ld, const xmlNode *p, const struct source
     return true;
 }
 
-/* n corners, whose numbers start at `numbers`, into triangles of the mesh. */
-static bool add_polygon(struct loader *ld, struct mesh *m, const xmlNode *p,
-                        const struct sources *all, const struct inputs *in, struct polygon *work,
-                        const uint32_t *numbers, size_t n, size_t which)
+/* How the corners of a <p> make polygons. */
+enum cut { CUT_TRIANGLES, CUT_BY_VCOUNT, CUT_WHOLE, CUT_STRIP, CUT_FAN, CUT_NOTHING };
+static const struct primitive_kind {
+    const char *name, *children;
+    enum cut cut;
+} KINDS[] = {
+    {"triangles", "input p extra", CUT_TRIANGLES},
+    {"polylist", "input vcount p extra", CUT_BY_VCOUNT},
+    {"polygons", "input p ph extra", CUT_WHOLE},
+    {"tristrips", "input p extra", CUT_STRIP},
+    {"trifans", "input p extra", CUT_FAN},
+    {"lines", NULL, CUT_NOTHING},
+    {"linestrips", NULL, CUT_NOTHING},
+};
+
+/* What reading one primitive needs. */
+struct primitive {
+    const struct primitive_kind *kind;
+    const struct sources *all;
+    struct inputs in;
+    struct polygon *work;
+    struct uints sizes; /* CUT_BY_VCOUNT */
+    size_t found;       /* polygons */
+};
+
+/* The place in <p> of corner k of the polygon that begins at corner `at`. Every other triangle of a
+ * strip runs backwards. */
+static size_t corner_of(enum cut cut, size_t at, size_t k)
 {
+    if (cut == CUT_FAN && k == 0)
+        return 0;
+    return at + (cut == CUT_STRIP && at % 2 == 1 && k > 0 ? 3 - k : k);
+}
+
+/* A polygon of n corners into triangles of the mesh. */
+static bool add_polygon(struct loader *ld, struct mesh *m, const xmlNode *p, struct primitive *of,
+                        const uint32_t *numbers, size_t at, size_t n)
+{
+    size_t which = of->found++;
+    struct polygon *work = of->work;
     if (n < 3 || n > MAX_POLYGON_CORNERS)
         return fail_at(ld, p, "polygon %zu has %zu corners; 3 to %d are supported", which, n,
                        MAX_POLYGON_CORNERS);
     if (!reserve_polygon(ld, work, n))
         return false;
     for (size_t k = 0; k < n; k++) {
-        if (!read_corner(ld, p, all, in, numbers + k * in->stride, &work->corners[k]))
+        if (!read_corner(ld, p, of->all, &of->in,
+                         numbers + corner_of(of->kind->cut, at, k) * of->in.stride,
+                         &work->corners[k]))
             return false;
         work->points[k] = work->corners[k].position;
     }
@@ -104,92 +141,74 @@ static bool add_polygon(struct loader *ld, struct mesh *m, const xmlNode *p,
     return true;
 }
 
-/* <polylist> and <triangles>: one <p> for all. vcount is NULL for triangles. */
-static bool read_list(struct loader *ld, struct mesh *m, const xmlNode *primitive,
-                      const struct sources *all, const struct inputs *in, struct polygon *work,
-                      uint64_t count)
+/* One <p>. */
+static bool read_p(struct loader *ld, struct mesh *m, const xmlNode *node, struct primitive *of)
 {
-    struct uints p = {NULL, 0, 0}, sizes = {NULL, 0, 0};
-    bool ok = false;
-    xmlNode *p_node, *size_node;
-    bool is_polylist = element_is(primitive, "polylist");
-    if (!element_one_child(ld, primitive, "p", &p_node) ||
-        !element_one_child(ld, primitive, "vcount", &size_node))
-        goto done;
-    if (p_node != NULL && !text_read_uints(ld, p_node, &p))
-        goto done;
-    if (is_polylist && size_node != NULL && !text_read_uints(ld, size_node, &sizes))
-        goto done;
-    if (is_polylist && sizes.count != count) {
-        fail_at(ld, size_node != NULL ? size_node : primitive,
-                "<vcount> has %zu numbers, the count is %llu", sizes.count,
-                (unsigned long long)count);
-        goto done;
+    struct uints p = {NULL, 0, 0};
+    enum cut cut = of->kind->cut;
+    bool slides = cut == CUT_STRIP || cut == CUT_FAN;
+    bool ok = text_read_uints(ld, node, &p);
+    size_t corners = p.count / of->in.stride, at = 0;
+    if (ok && p.count % of->in.stride != 0)
+        ok = fail_at(ld, node, "<p> has %zu indices, which is not a multiple of %llu", p.count,
+                     (unsigned long long)of->in.stride);
+    while (ok && at < corners - (slides && corners > 2 ? 2 : 0)) {
+        size_t left = corners - at, n = slides ? (left < 3 ? left : 3) : 3;
+        if (cut == CUT_WHOLE)
+            n = corners;
+        else if (cut == CUT_BY_VCOUNT && of->found < of->sizes.count)
+            n = of->sizes.data[of->found];
+        else if (cut == CUT_BY_VCOUNT)
+            n = left + 1;
+        ok = n <= left ? add_polygon(ld, m, node, of, p.data, at, n)
+                       : fail_at(ld, node, "<p> has %zu corners, which do not end with polygon %zu",
+                                 corners, of->found);
+        at += slides ? 1 : n;
     }
-    uint64_t corners = is_polylist ? 0 : 3 * count;
-    for (size_t i = 0; i < sizes.count; i++)
-        corners += sizes.data[i];
-    if (p.count % in->stride != 0 || corners != p.count / in->stride) {
-        fail_at(ld, p_node != NULL ? p_node : primitive,
-                "<p> has %zu indices where %llu corners of %llu each are announced", p.count,
-                (unsigned long long)corners, (unsigned long long)in->stride);
-        goto done;
-    }
-    size_t at = 0;
-    for (size_t i = 0; i < count; i++) {
-        size_t n = is_polylist ? sizes.data[i] : 3;
-        if (!add_polygon(ld, m, p_node, all, in, work, p.data + at, n, i))
-            goto done;
-        at += n * in->stride;
-    }
-    ok = true;
-done:
     free(p.data);
-    free(sizes.data);
     return ok;
 }
 
-/* <polygons>: a <p> for each. */
-static bool read_polygons(struct loader *ld, struct mesh *m, const xmlNode *primitive,
-                          const struct sources *all, const struct inputs *in, struct polygon *work,
-                          uint64_t count)
+static bool read_all_p(struct loader *ld, struct mesh *m, const xmlNode *primitive,
+                       struct primitive *of, uint64_t count)
 {
-    uint64_t found = 0;
+    xmlNode *vcount;
+    size_t num_p = 0;
+    enum cut cut = of->kind->cut;
+    if (!element_one_child(ld, primitive, "vcount", &vcount) ||
+        (vcount != NULL && !text_read_uints(ld, vcount, &of->sizes)))
+        return false;
+    if (cut == CUT_BY_VCOUNT && of->sizes.count != count)
+        return fail_at(ld, vcount != NULL ? vcount : primitive,
+                       "<vcount> has %zu numbers, the count is %llu", of->sizes.count,
+                       (unsigned long long)count);
     for (const xmlNode *c = element_first_child(primitive); c != NULL;
          c = element_next_sibling(c)) {
         if (element_is(c, "ph"))
             return fail_at(ld, c, "polygons with holes (<ph>) are not supported");
         if (!element_is(c, "p"))
             continue;
-        struct uints p = {NULL, 0, 0};
-        bool ok = text_read_uints(ld, c, &p);
-        if (ok && p.count % in->stride != 0)
-            ok = fail_at(ld, c, "<p> has %zu indices, which is not a multiple of %llu", p.count,
-                         (unsigned long long)in->stride);
-        if (ok)
-            ok = add_polygon(ld, m, c, all, in, work, p.data, p.count / in->stride, found);
-        free(p.data);
-        if (!ok)
+        if (num_p++ > 0 && (cut == CUT_TRIANGLES || cut == CUT_BY_VCOUNT))
+            return fail_at(ld, c, "a second <p> in <%s>", of->kind->name);
+        if (!read_p(ld, m, c, of))
             return false;
-        found++;
     }
-    if (found != count)
-        return fail_at(ld, primitive, "<polygons> has %llu <p>, its count says %llu",
-                       (unsigned long long)found, (unsigned long long)count);
-    return true;
+    bool by_polygon = cut == CUT_TRIANGLES || cut == CUT_BY_VCOUNT;
+    size_t found = by_polygon ? of->found : num_p;
+    return found == count ||
+           fail_at(ld, primitive, "<%s> has %zu %s, its count says %llu", of->kind->name, found,
+                   by_polygon ? "polygons" : "<p>", (unsigned long long)count);
 }
 
 static bool read_primitive(struct loader *ld, struct mesh *m, const xmlNode *primitive,
-                           struct sources *all, struct polygon *work)
+                           const struct primitive_kind *kind, struct sources *all,
+                           struct polygon *work)
 {
-    struct inputs in;
+    struct primitive of = {.kind = kind, .all = all, .work = work};
     uint64_t count;
-    const char *children = element_is(primitive, "polylist")   ? "input vcount p extra"
-                           : element_is(primitive, "polygons") ? "input p ph extra"
-                                                               : "input p extra";
-    if (!element_only_children(ld, primitive, children) ||
+    if (!element_only_children(ld, primitive, kind->children) ||
         !element_attribute_count(ld, primitive, "count", &count) ||
-        !source_read_inputs(ld, all, primitive, &in))
+        !source_read_inputs(ld, all, primitive, &of.in))
         return false;
     struct mesh_group *g = realloc(m->groups, (m->num_groups + 1) * sizeof *g);
     if (g == NULL)
@@ -199,9 +218,8 @@ static bool read_primitive(struct loader *ld, struct mesh *m, const xmlNode *pri
     *g = (struct mesh_group){.symbol = element_attribute(primitive, "material"),
                              .node = primitive,
                              .first = m->num_triangles};
-    bool ok = element_is(primitive, "polygons")
-                  ? read_polygons(ld, m, primitive, all, &in, work, count)
-                  : read_list(ld, m, primitive, all, &in, work, count);
+    bool ok = read_all_p(ld, m, primitive, &of, count);
+    free(of.sizes.data);
     g->count = m->num_triangles - g->first;
     return ok;
 }
@@ -213,12 +231,15 @@ static bool read_mesh(struct loader *ld, struct mesh *m, const xmlNode *node)
     bool ok = true;
     for (const xmlNode *c = element_first_child(node); ok && c != NULL;
          c = element_next_sibling(c)) {
-        if (element_is_one_of(c, "polylist triangles polygons"))
-            ok = read_primitive(ld, m, c, &all, &work);
-        else if (element_is_one_of(c, "lines linestrips trifans tristrips"))
-            ok = fail_at(ld, c, "<%s> is not supported", (const char *)c->name);
-        else if (!element_is_one_of(c, "source vertices extra"))
-            ok = element_fail_unexpected(ld, c);
+        size_t k = 0;
+        while (k < sizeof KINDS / sizeof *KINDS && !element_is(c, KINDS[k].name))
+            k++;
+        if (k == sizeof KINDS / sizeof *KINDS)
+            ok = element_is_one_of(c, "source vertices extra") || element_fail_unexpected(ld, c);
+        else if (KINDS[k].cut == CUT_NOTHING)
+            ld->num_left_out[LEFT_OUT_LINES]++;
+        else
+            ok = read_primitive(ld, m, c, &KINDS[k], &all, &work);
     }
     source_release(&all);
     free(work.corners);
@@ -229,37 +250,23 @@ static bool read_mesh(struct loader *ld, struct mesh *m, const xmlNode *node)
 
 static bool read_sphere(struct loader *ld, struct mesh *m, const xmlNode *technique)
 {
+    const struct field radius = {"radius", FIELD_NUMBER, &m->radius,
+                                 true,     .lo = 1e-300, .hi = 1e300};
     xmlNode *sphere;
+    bool inward = false;
     if (!element_technique_content(ld, technique, &sphere))
         return false;
     if (!element_is(sphere, "sphere"))
         return fail_at(ld, sphere, "unknown geometry tag '%.60s'", (const char *)sphere->name);
     bool is_assay = strcmp(element_attribute(technique, "profile"), "ASSAY") == 0;
-    if (!element_only_children(ld, sphere, is_assay ? "radius facing" : "radius"))
+    if (!(is_assay ? field_read_all(
+                         ld, sphere,
+                         FIELDS(radius, {"facing", FIELD_CHOICE, &inward, .words = {"out", "in"}}))
+                   : field_read_all(ld, sphere, &radius, 1)))
         return false;
-    xmlNode *radius, *facing;
-    if (!element_one_child(ld, sphere, "radius", &radius) ||
-        !element_one_child(ld, sphere, "facing", &facing))
-        return false;
-    if (radius == NULL)
-        return fail_at(ld, sphere, "<sphere> without <radius>");
-    if (!text_read_exactly(ld, radius, &m->radius, 1))
-        return false;
-    if (!(m->radius > 0))
-        return fail_at(ld, radius, "a sphere's radius must be positive, not %g", m->radius);
     m->is_sphere = true;
-    m->normal_out = 1;
-    if (facing == NULL)
-        return true;
-    char *word = text_read_word(ld, facing);
-    if (word == NULL)
-        return false;
-    bool in = strcmp(word, "in") == 0, ok = in || strcmp(word, "out") == 0;
-    if (!ok)
-        fail_at(ld, facing, "<facing> is '%.60s': only 'in' and 'out' are known", word);
-    m->normal_out = in ? -1 : 1;
-    free(word);
-    return ok;
+    m->normal_out = inward ? -1 : 1;
+    return true;
 }
 
 static bool read_geometry(struct loader *ld, const xmlNode *geometry, struct mesh *m)

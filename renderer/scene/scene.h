@@ -157,7 +157,7 @@ struct scene {
                                   triangle's own */
     unsigned num_dark_lights;  /* point, spot and directional lights of zero power */
     unsigned starter;          /* cs184_deviations.h; 0: nothing is done wrong */
-    char note[256];            /* what the dialect merged, one line for the user; else empty */
+    char note[512];            /* what was merged or left out, one line for the user; else empty */
 };
 
 /* Frees all arrays and zeroes the struct; a zeroed scene is fine. */

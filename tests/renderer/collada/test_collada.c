@@ -320,7 +320,7 @@ static void run_file(const char *path, int cases)
 
 TEST(geometry)
 {
-    run_file("tests/renderer/collada/geometry.cases", 29);
+    run_file("tests/renderer/collada/geometry.cases", 33);
 }
 TEST(materials)
 {
@@ -328,11 +328,11 @@ TEST(materials)
 }
 TEST(lights_and_cameras)
 {
-    run_file("tests/renderer/collada/light.cases", 35);
+    run_file("tests/renderer/collada/light.cases", 36);
 }
 TEST(refused)
 {
-    run_file("tests/renderer/collada/refused.cases", 66);
+    run_file("tests/renderer/collada/refused.cases", 72);
 }
 
 TEST(microfacet_of_ours)
