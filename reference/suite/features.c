@@ -111,7 +111,7 @@ static unsigned material_features(const struct material *m)
     }
     if (!rgb_is_zero(m->radiance))
         f |= 1u << (m->radiance_both_sides ? FEATURE_TWO_SIDED : FEATURE_AREA);
-    if (m->reflectance_map != 0 || m->radiance_map != 0)
+    if (material_has_map(m))
         f |= 1u << FEATURE_TEXTURE;
     return f;
 }
@@ -265,7 +265,7 @@ bool features_check_normals(const char *engine, const struct scene *s, struct er
 bool features_check_textures(const char *engine, const struct scene *s, struct err *e)
 {
     for (uint32_t i = 0; i < s->num_materials; i++)
-        if (s->materials[i].reflectance_map != 0 || s->materials[i].radiance_map != 0)
+        if (material_has_map(&s->materials[i]))
             return err_set(e, "%s: the texture of material '%s' cannot be expressed", engine,
                            s->materials[i].name);
     return true;

@@ -129,13 +129,14 @@ static bool instance_geometry(struct loader *ld, const xmlNode *instance, const 
     const struct mesh *mesh;
     double sign;
     uint32_t material;
+    size_t set;
     const char *name = name_of(at->node);
     if (!element_follow(ld, instance, "url", "geometry", &geometry) ||
         !build_transform_sign(ld, instance, &at->to_world, &sign) ||
         !geometry_get(ld, geometry, &mesh))
         return false;
     if (mesh->is_sphere)
-        return material_get(ld, instance, geometry, NULL, &material) &&
+        return material_get(ld, instance, geometry, NULL, NULL, &material, &set) &&
                build_begin_object(ld, name, NULL, material, false) &&
                build_add_sphere(ld, instance, &at->to_world, mesh->radius, mesh->normal_out);
     for (size_t g = 0; g < mesh->num_groups; g++) {
@@ -144,12 +145,18 @@ static bool instance_geometry(struct loader *ld, const xmlNode *instance, const 
             return fail_at(ld, group->node, "<%s> without attribute 'material'",
                            (const char *)group->node->name);
         const char *suffix = mesh->num_groups > 1 ? group->symbol : NULL;
-        if (!material_get(ld, instance, group->node, group->symbol, &material) ||
+        if (!material_get(ld, instance, group->node, group->symbol, group, &material, &set) ||
             !build_begin_object(ld, name, suffix, material, false))
             return false;
-        for (size_t t = group->first; t < group->first + group->count; t++)
-            if (!build_add_triangle(ld, instance, &at->to_world, sign, mesh->corners + 3 * t))
+        const bool uses_uv = material_has_map(&ld->scene.materials[material]);
+        for (size_t t = group->first; t < group->first + group->count; t++) {
+            const struct corner *c = mesh->corners + 3 * t;
+            struct uv uv[3];
+            for (int k = 0; uses_uv && k < 3; k++)
+                uv[k] = mesh->uv[c[k].uv + set];
+            if (!build_add_triangle(ld, instance, &at->to_world, sign, c, uses_uv ? uv : NULL))
                 return false;
+        }
     }
     return true;
 }

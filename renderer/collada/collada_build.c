@@ -86,8 +86,8 @@ bool build_begin_object(struct loader *ld, const char *name, const char *symbol,
 static bool reserve_triangle(struct loader *ld)
 {
     struct scene *s = &ld->scene;
-    size_t count = s->num_triangles, cap[4];
-    for (int i = 0; i < 4; i++)
+    size_t count = s->num_triangles, cap[5];
+    for (int i = 0; i < 5; i++)
         cap[i] = ld->cap_triangles;
     vec3 *p = build_grow(ld, s->position, 3 * sizeof *p, count, &cap[0]);
     if (p == NULL)
@@ -105,6 +105,12 @@ static bool reserve_triangle(struct loader *ld)
     if (id == NULL)
         return false;
     s->tri_object = id;
+    if (ld->has_textures) {
+        struct uv *uv = build_grow(ld, s->uv, 3 * sizeof *uv, count, &cap[4]);
+        if (uv == NULL)
+            return false;
+        s->uv = uv;
+    }
     ld->cap_triangles = cap[0];
     return true;
 }
@@ -132,11 +138,12 @@ bool build_transform_sign(struct loader *ld, const xmlNode *n, const mat4 *m, do
 }
 
 bool build_add_triangle(struct loader *ld, const xmlNode *n, const mat4 *m, double sign,
-                        const struct corner c[3])
+                        const struct corner c[3], const struct uv uv[3])
 {
     struct scene *s = &ld->scene;
     /* A mirrored triangle keeps its front side by changing its winding. */
-    const struct corner *in[3] = {&c[0], sign < 0 ? &c[2] : &c[1], sign < 0 ? &c[1] : &c[2]};
+    const int order[3] = {0, sign < 0 ? 2 : 1, sign < 0 ? 1 : 2};
+    const struct corner *in[3] = {&c[0], &c[order[1]], &c[order[2]]};
     vec3 p[3], normal[3];
     for (int k = 0; k < 3; k++)
         if (!to_world(ld, n, m, in[k]->position, &p[k]))
@@ -166,6 +173,8 @@ bool build_add_triangle(struct loader *ld, const xmlNode *n, const mat4 *m, doub
     uint32_t i = s->num_triangles++;
     memcpy(s->position + 3 * (size_t)i, p, sizeof p);
     memcpy(s->normal + 3 * (size_t)i, normal, sizeof normal);
+    for (size_t k = 0; ld->has_textures && k < 3; k++)
+        s->uv[3 * (size_t)i + k] = uv != NULL ? uv[order[k]] : (struct uv){0, 0};
     s->tri_material[i] = o->material;
     s->tri_object[i] = s->num_objects - 1;
     o->num_triangles++;
@@ -282,6 +291,8 @@ static void remove_object(struct loader *ld, uint32_t i)
             3 * tail * sizeof *s->position);
     memmove(s->normal + 3 * (size_t)o.first_triangle, s->normal + 3 * from,
             3 * tail * sizeof *s->normal);
+    if (s->uv != NULL)
+        memmove(s->uv + 3 * (size_t)o.first_triangle, s->uv + 3 * from, 3 * tail * sizeof *s->uv);
     memmove(s->tri_material + o.first_triangle, s->tri_material + from,
             tail * sizeof *s->tri_material);
     memmove(s->tri_object + o.first_triangle, s->tri_object + from, tail * sizeof *s->tri_object);

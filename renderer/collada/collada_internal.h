@@ -18,7 +18,8 @@ enum {
     MAX_NODE_DEPTH = 100,
     MAX_NODES = 1 << 20, /* visited, so instances count */
     MAX_TRIANGLES = 1 << 25,
-    MAX_POLYGON_CORNERS = 1 << 14
+    MAX_POLYGON_CORNERS = 1 << 14,
+    MAX_UV_SETS = 8 /* of one primitive */
 };
 
 struct id_entry {
@@ -41,6 +42,7 @@ struct uints {
 struct corner {
     dvec3 position;
     float normal[3];
+    uint32_t uv; /* where the group's sets of texture coordinates begin in the mesh */
 };
 
 /* One <polylist>, <triangles> or <polygons>. */
@@ -48,6 +50,8 @@ struct mesh_group {
     const char *symbol; /* of the material; NULL if absent; lives in the document */
     const xmlNode *node;
     size_t first, count; /* triangles */
+    size_t num_uv;       /* sets of texture coordinates, and their numbers */
+    uint64_t uv_set[MAX_UV_SETS];
 };
 
 /* A parsed <geometry>: triangles in groups, or one sphere. */
@@ -57,6 +61,8 @@ struct mesh {
     size_t num_triangles, capacity;
     struct mesh_group *groups;
     size_t num_groups;
+    struct uv *uv;
+    size_t num_uv, cap_uv;
     bool is_sphere;
     double radius;
     float normal_out;
@@ -65,6 +71,7 @@ struct mesh {
 struct material_slot {
     const xmlNode *node; /* <material>; NULL: the grey of CGL */
     uint32_t index;
+    const char *texcoord; /* what its textures are looked up by */
 };
 
 /* What is in a file and not in a still image of surfaces: counted for the note. */
@@ -87,12 +94,15 @@ struct loader {
     size_t num_meshes, cap_meshes;
     struct material_slot *slots;
     size_t num_slots, cap_slots;
-    bool *is_lamp; /* per object: it came from a light element */
+    bool has_textures;    /* somewhere: texture coordinates are read */
+    const char *texcoord; /* of the material that is being read */
+    bool *is_lamp;        /* per object: it came from a light element */
     size_t num_nodes;
     unsigned num_cameras;
     rgb ambient;        /* of all ambient lights */
     struct scene scene; /* under construction; num_* are also the array sizes in use */
-    size_t cap_triangles, cap_spheres, cap_materials, cap_lights, cap_objects;
+    size_t cap_triangles, cap_spheres, cap_materials, cap_lights, cap_objects, cap_images,
+        cap_textures;
 };
 
 /* collada_xml.c */
@@ -208,6 +218,15 @@ struct texture_use {
 };
 bool parameter_get_texture(struct loader *ld, const xmlNode *texture, struct texture_use *out);
 
+/* collada_texture.c */
+
+/* The map of a <texture>, its image read if it has not been; *texcoord: what it is looked up by. */
+bool texture_get(struct loader *ld, const xmlNode *texture, uint32_t *map, const char **texcoord);
+/* Which set of a group that name stands for in an <instance_geometry>, by its <instance_material>;
+ * group NULL: a sphere. */
+bool texture_find_set(struct loader *ld, const xmlNode *instance, const xmlNode *binding,
+                      const char *texcoord, const struct mesh_group *group, size_t *which);
+
 /* collada_extra.c */
 
 /* Our or the assignment's material tag in a technique of theirs, on top of what profile_COMMON has
@@ -227,9 +246,9 @@ bool build_add_light(struct loader *ld, const struct light *l);
 bool build_begin_object(struct loader *ld, const char *name, const char *symbol, uint32_t material,
                         bool is_lamp);
 /* One triangle of the object begun last, through the transform, whose determinant has that sign.
- * `n` is who to blame. */
+ * `n` is who to blame. uv: of the three; NULL: of no use. */
 bool build_add_triangle(struct loader *ld, const xmlNode *n, const mat4 *m, double sign,
-                        const struct corner c[3]);
+                        const struct corner c[3], const struct uv uv[3]);
 bool build_add_sphere(struct loader *ld, const xmlNode *n, const mat4 *m, double radius,
                       float normal_out);
 /* Sign of the determinant; fails for a matrix that is singular or not affine. */
@@ -241,11 +260,12 @@ void build_drop_twin_lamps(struct loader *ld);
 
 /* collada_source.c */
 
-/* The triples that an accessor picks out of a <float_array>. */
+/* The triples or pairs that an accessor picks out of a <float_array>. */
 struct source {
     const xmlNode *node;
-    double *xyz; /* 3 per item */
+    double *xyz; /* `width` per item */
     uint32_t count;
+    unsigned width;
 };
 
 /* Sources of one mesh are parsed once, however many primitives share them. */
@@ -260,6 +280,12 @@ struct inputs {
     uint64_t vertex_offset, normal_offset;
     long position, normal;
     bool normal_by_vertex; /* the normal's index is the vertex's */
+    size_t num_uv;
+    struct uv_input {
+        uint64_t set, offset;
+        long source;
+        bool by_vertex;
+    } uv[MAX_UV_SETS];
 };
 
 /* Reads the inputs of a <polylist>, <triangles> or <polygons>. */
@@ -273,9 +299,11 @@ void mesh_release(struct mesh *m);
 
 /* collada_material.c */
 
-/* The material bound to `symbol` (NULL: the only one) by an <instance_geometry>. */
+/* The material bound to `symbol` (NULL: the only one) by an <instance_geometry>; which of the group's
+ * sets of texture coordinates it means, if it has textures. group NULL: a sphere. */
 bool material_get(struct loader *ld, const xmlNode *instance, const xmlNode *user,
-                  const char *symbol, uint32_t *index);
+                  const char *symbol, const struct mesh_group *group, uint32_t *index,
+                  size_t *uv_set);
 
 /* collada_light.c */
 bool light_instance(struct loader *ld, const xmlNode *instance, const xmlNode *light,

@@ -116,7 +116,7 @@ static bool add_lamp(struct loader *ld, const xmlNode *n, const char *name, cons
     unsigned dropped = ld->scene.num_degenerate;
     for (int t = 0; t < 2; t++) {
         struct corner c[3] = {{.position = p[0]}, {.position = p[1 + t]}, {.position = p[2 + t]}};
-        if (!build_add_triangle(ld, n, m, sign, c))
+        if (!build_add_triangle(ld, n, m, sign, c, NULL))
             return false;
     }
     if (ld->scene.num_degenerate != dropped)

@@ -23,9 +23,7 @@ static bool find_value(struct loader *ld, const xmlNode *shader, const char *nam
     if (element_is(*value, "texture") && strcmp(own, "color") == 0)
         return parameter_get_texture(ld, *value, &texture) &&
                fail_at(ld, *value, "<%s> by <texture> is not supported%s", name,
-                       ld->dialect == DIALECT_COLLADA && strcmp(name, "diffuse") != 0
-                           ? " (--dialect cgl ignores it)"
-                           : "");
+                       ld->dialect == DIALECT_COLLADA ? " (--dialect cgl ignores it)" : "");
     return element_is(*value, own) || element_fail_unexpected(ld, *value);
 }
 
@@ -36,6 +34,27 @@ static bool read_channel(struct loader *ld, const xmlNode *shader, const char *n
     const xmlNode *color;
     return find_value(ld, shader, name, "color", "float3 float4", &color) &&
            (color == NULL || text_read_color(ld, color, value, alpha));
+}
+
+/* The same, or a <texture>: *value is then white. */
+static bool read_mapped_channel(struct loader *ld, const xmlNode *shader, const char *name,
+                                rgb *value, uint32_t *map)
+{
+    xmlNode *channel;
+    const char *texcoord, *other = ld->texcoord;
+    if (!element_one_child(ld, shader, name, &channel))
+        return false;
+    const xmlNode *texture = channel != NULL ? element_first_child(channel) : NULL;
+    if (texture == NULL || !element_is(texture, "texture"))
+        return read_channel(ld, shader, name, value, NULL);
+    if (element_next_sibling(texture) != NULL)
+        return element_fail_unexpected(ld, element_next_sibling(texture));
+    if (!texture_get(ld, texture, map, &texcoord))
+        return false;
+    *value = grey(1);
+    ld->texcoord = texcoord;
+    return other == NULL || (texcoord != NULL && strcmp(texcoord, other) == 0) ||
+           fail_at(ld, texture, "a second set of texture coordinates in one material");
 }
 
 static bool read_factor(struct loader *ld, const xmlNode *shader, const char *name, double *value)
@@ -114,8 +133,8 @@ static bool read_shader(struct loader *ld, const xmlNode *shader, struct materia
         return false;
     m->reflectance = grey(ld->dialect == DIALECT_CGL && !is_constant ? 0.5f : 0);
     m->radiance_both_sides = true;
-    if (!read_channel(ld, shader, "diffuse", &m->reflectance, NULL) ||
-        !read_channel(ld, shader, "emission", &m->radiance, NULL))
+    if (!read_mapped_channel(ld, shader, "diffuse", &m->reflectance, &m->reflectance_map) ||
+        !read_mapped_channel(ld, shader, "emission", &m->radiance, &m->radiance_map))
         return false;
     if (rgb_max(m->reflectance) > 1)
         return fail_at(ld, element_child_named(shader, "diffuse"), "diffuse reflectance above 1");
@@ -169,7 +188,13 @@ static bool read_effect(struct loader *ld, const xmlNode *effect, struct materia
         return fail_at(ld, effect, "<effect> without <profile_COMMON>");
     if (common != NULL && !read_common(ld, common, m))
         return false;
-    return technique == NULL || extra_read_material(ld, technique, m);
+    if (technique == NULL)
+        return true;
+    if (!extra_read_material(ld, technique, m))
+        return false;
+    if (m->kind != MATERIAL_DIFFUSE) /* which has taken the place of what had a texture */
+        m->reflectance_map = 0;
+    return true;
 }
 
 static bool read_material(struct loader *ld, const xmlNode *material, struct material *m)
@@ -191,14 +216,17 @@ static bool read_material(struct loader *ld, const xmlNode *material, struct mat
 }
 
 /* material NULL: what the assignment takes for a surface without material. */
-static bool slot_get(struct loader *ld, const xmlNode *material, uint32_t *index)
+static bool slot_get(struct loader *ld, const xmlNode *material, uint32_t *index,
+                     const char **texcoord)
 {
     for (size_t i = 0; i < ld->num_slots; i++) {
         if (ld->slots[i].node == material) {
             *index = ld->slots[i].index;
+            *texcoord = ld->slots[i].texcoord;
             return true;
         }
     }
+    ld->texcoord = NULL;
     struct material m = {.name = "default", .kind = MATERIAL_DIFFUSE, .reflectance = grey(0.5f)};
     if (material != NULL && !read_material(ld, material, &m))
         return false;
@@ -209,7 +237,8 @@ static bool slot_get(struct loader *ld, const xmlNode *material, uint32_t *index
     ld->slots = grown;
     if (!build_add_material(ld, &m, index))
         return false;
-    ld->slots[ld->num_slots++] = (struct material_slot){material, *index};
+    *texcoord = ld->texcoord;
+    ld->slots[ld->num_slots++] = (struct material_slot){material, *index, *texcoord};
     return true;
 }
 
@@ -229,8 +258,10 @@ static bool find_bindings(struct loader *ld, const xmlNode *instance, xmlNode **
 }
 
 bool material_get(struct loader *ld, const xmlNode *instance, const xmlNode *user,
-                  const char *symbol, uint32_t *index)
+                  const char *symbol, const struct mesh_group *group, uint32_t *index,
+                  size_t *uv_set)
 {
+    const char *texcoord;
     xmlNode *common;
     const xmlNode *material = NULL;
     if (!find_bindings(ld, instance, &common))
@@ -258,5 +289,7 @@ bool material_get(struct loader *ld, const xmlNode *instance, const xmlNode *use
                    : fail_at(ld, instance, "no material bound to <%.60s> of line %ld",
                              (const char *)user->name, element_line(user));
     return (match == NULL || element_follow(ld, match, "target", "material", &material)) &&
-           slot_get(ld, material, index);
+           slot_get(ld, material, index, &texcoord) &&
+           (!material_has_map(&ld->scene.materials[*index]) ||
+            texture_find_set(ld, instance, match, texcoord, group, uv_set));
 }

@@ -17,6 +17,7 @@ void mesh_release(struct mesh *m)
 {
     free(m->corners);
     free(m->groups);
+    free(m->uv);
     *m = (struct mesh){0};
 }
 
@@ -36,8 +37,35 @@ static bool reserve_polygon(struct loader *ld, struct polygon *work, size_t n)
     return true;
 }
 
-static bool read_corner(struct loader *ld, const xmlNode *p, const struct sources *all,
-                        const struct inputs *in, const uint32_t *numbers, struct corner *out)
+/* Texture coordinates beyond float's digits are none. */
+#define MOST_UV 1e6
+
+/* All sets of a corner. */
+static bool read_uv(struct loader *ld, struct mesh *m, const xmlNode *p, const struct sources *all,
+                    const struct inputs *in, const uint32_t *numbers, struct corner *out)
+{
+    out->uv = (uint32_t)m->num_uv;
+    for (size_t k = 0; k < in->num_uv; k++) {
+        const struct source *from = &all->data[in->uv[k].source];
+        uint32_t i = numbers[in->uv[k].by_vertex ? in->vertex_offset : in->uv[k].offset];
+        struct uv *grown = build_grow(ld, m->uv, sizeof *grown, m->num_uv, &m->cap_uv);
+        if (grown == NULL)
+            return false;
+        m->uv = grown;
+        if (i >= from->count)
+            return fail_at(ld, p, "texture coordinate index %u out of range: there are %u", i,
+                           from->count);
+        const double *x = from->xyz + 2 * (size_t)i;
+        if (!(fabs(x[0]) <= MOST_UV && fabs(x[1]) <= MOST_UV) || m->num_uv >= UINT32_MAX)
+            return fail_at(ld, p, "texture coordinate %u is beyond %g", i, MOST_UV);
+        grown[m->num_uv++] = (struct uv){(float)x[0], (float)x[1]};
+    }
+    return true;
+}
+
+static bool read_corner(struct loader *ld, struct mesh *m, const xmlNode *p,
+                        const struct sources *all, const struct inputs *in, const uint32_t *numbers,
+                        struct corner *out)
 {
     const struct source *position = &all->data[in->position];
     uint32_t i = numbers[in->vertex_offset];
@@ -49,6 +77,8 @@ static bool read_corner(struct loader *ld, const xmlNode *p, const struct source
         if (fabs(x[k]) > FARTHEST)
             return fail_at(ld, p, "vertex %u: a coordinate is beyond %g", i, FARTHEST);
     memset(out->normal, 0, sizeof out->normal);
+    if (!read_uv(ld, m, p, all, in, numbers, out))
+        return false;
     if (in->normal < 0)
         return true;
     const struct source *normal = &all->data[in->normal];
@@ -114,7 +144,7 @@ static bool add_polygon(struct loader *ld, struct mesh *m, const xmlNode *p, str
     if (!reserve_polygon(ld, work, n))
         return false;
     for (size_t k = 0; k < n; k++) {
-        if (!read_corner(ld, p, of->all, &of->in,
+        if (!read_corner(ld, m, p, of->all, &of->in,
                          numbers + corner_of(of->kind->cut, at, k) * of->in.stride,
                          &work->corners[k]))
             return false;
@@ -217,7 +247,10 @@ static bool read_primitive(struct loader *ld, struct mesh *m, const xmlNode *pri
     g = &g[m->num_groups++];
     *g = (struct mesh_group){.symbol = element_attribute(primitive, "material"),
                              .node = primitive,
-                             .first = m->num_triangles};
+                             .first = m->num_triangles,
+                             .num_uv = of.in.num_uv};
+    for (size_t k = 0; k < of.in.num_uv; k++)
+        g->uv_set[k] = of.in.uv[k].set;
     bool ok = read_all_p(ld, m, primitive, &of, count);
     free(of.sizes.data);
     g->count = m->num_triangles - g->first;

@@ -12,8 +12,8 @@ void source_release(struct sources *all)
     *all = (struct sources){NULL, 0, 0};
 }
 
-/* Positions of the first three named <param>s: unnamed ones are not for us to see. */
-static bool read_params(struct loader *ld, const xmlNode *accessor, uint64_t stride,
+/* Positions of the first `width` named <param>s: unnamed ones are not for us to see. */
+static bool read_params(struct loader *ld, const xmlNode *accessor, uint64_t stride, unsigned width,
                         uint64_t param[3])
 {
     uint64_t place = 0, named = 0;
@@ -24,18 +24,18 @@ static bool read_params(struct loader *ld, const xmlNode *accessor, uint64_t str
         const char *name = element_attribute(p, "name"), *type = element_attribute(p, "type");
         if (type != NULL && strcmp(type, "float") != 0 && strcmp(type, "double") != 0)
             return fail_at(ld, p, "<param> of type '%.60s' where numbers are needed", type);
-        if (name != NULL && name[0] != '\0' && named < 3)
+        if (name != NULL && name[0] != '\0' && named < width)
             param[named++] = place;
     }
-    if (named < 3)
-        return fail_at(ld, accessor, "<accessor> has %d named <param>s where 3 are needed",
-                       (int)named);
+    if (named < width)
+        return fail_at(ld, accessor, "<accessor> has %d named <param>s where %u are needed",
+                       (int)named, width);
     if (stride < place)
         return fail_at(ld, accessor, "<accessor> has more <param>s than its stride");
     return true;
 }
 
-static bool read_source(struct loader *ld, const xmlNode *node, struct source *out)
+static bool read_source(struct loader *ld, const xmlNode *node, unsigned width, struct source *out)
 {
     struct doubles d = {NULL, 0, 0};
     bool ok = false;
@@ -50,7 +50,7 @@ static bool read_source(struct loader *ld, const xmlNode *node, struct source *o
     if (!element_attribute_count(ld, accessor, "count", &count) ||
         !element_attribute_count_or(ld, accessor, "stride", 1, &stride) ||
         !element_attribute_count_or(ld, accessor, "offset", 0, &offset) ||
-        !read_params(ld, accessor, stride, param) ||
+        !read_params(ld, accessor, stride, width, param) ||
         !element_follow(ld, accessor, "source", "float_array", &array) ||
         !element_attribute_count(ld, array, "count", &declared) ||
         !text_read_doubles(ld, array, &d))
@@ -60,35 +60,37 @@ static bool read_source(struct loader *ld, const xmlNode *node, struct source *o
                 (unsigned long long)declared);
         goto done;
     }
-    if (count > 0 && offset + (count - 1) * stride + param[2] >= d.count) {
+    if (count > 0 && offset + (count - 1) * stride + param[width - 1] >= d.count) {
         fail_at(ld, accessor, "<accessor> reaches beyond the end of its <float_array>");
         goto done;
     }
-    if (offset == 0 && stride == 3 && param[0] == 0 && param[1] == 1 && param[2] == 2) {
-        *out = (struct source){node, d.data, (uint32_t)count};
+    if (offset == 0 && stride == 3 && width == 3 && param[2] == 2) {
+        *out = (struct source){node, d.data, (uint32_t)count, width};
         return true;
     }
-    *out = (struct source){node, malloc((3 * count + 1) * sizeof *out->xyz), (uint32_t)count};
+    *out = (struct source){node, malloc((width * count + 1) * sizeof *out->xyz), (uint32_t)count,
+                           width};
     if (out->xyz == NULL) {
         fail_memory(ld);
         goto done;
     }
     for (uint64_t i = 0; i < count; i++)
-        for (int k = 0; k < 3; k++)
-            out->xyz[3 * i + (uint64_t)k] = d.data[offset + i * stride + param[k]];
+        for (unsigned k = 0; k < width; k++)
+            out->xyz[width * i + k] = d.data[offset + i * stride + param[k]];
     ok = true;
 done:
     free(d.data);
     return ok;
 }
 
-static bool get_source(struct loader *ld, struct sources *all, const xmlNode *input, long *index)
+static bool get_source(struct loader *ld, struct sources *all, const xmlNode *input, unsigned width,
+                       long *index)
 {
     const xmlNode *node;
     if (!element_follow(ld, input, "source", "source", &node))
         return false;
     for (size_t i = 0; i < all->count; i++) {
-        if (all->data[i].node == node) {
+        if (all->data[i].node == node && all->data[i].width == width) {
             *index = (long)i;
             return true;
         }
@@ -97,18 +99,38 @@ static bool get_source(struct loader *ld, struct sources *all, const xmlNode *in
     if (grown == NULL)
         return false;
     all->data = grown;
-    if (!read_source(ld, node, &grown[all->count]))
+    if (!read_source(ld, node, width, &grown[all->count]))
         return false;
     *index = (long)all->count++;
     return true;
 }
 
-/* Texture coordinates and what hangs on them cannot show without textures, which are refused where
- * they are used. */
+static bool is_uv(const char *semantic)
+{
+    return strcmp(semantic, "TEXCOORD") == 0 || strcmp(semantic, "UV") == 0;
+}
+
+/* One more set of texture coordinates, of no use where nothing has a texture. */
+static bool add_uv(struct loader *ld, struct sources *all, const xmlNode *input, uint64_t offset,
+                   bool by_vertex, struct inputs *in)
+{
+    struct uv_input *uv = &in->uv[in->num_uv];
+    if (!ld->has_textures)
+        return true;
+    if (in->num_uv == MAX_UV_SETS)
+        return fail_at(ld, input, "more than %d sets of texture coordinates", MAX_UV_SETS);
+    in->num_uv++;
+    uv->offset = offset;
+    uv->by_vertex = by_vertex;
+    return element_attribute_count_or(ld, input, "set", 0, &uv->set) &&
+           get_source(ld, all, input, 2, &uv->source);
+}
+
+/* What hangs on texture coordinates shows nothing of its own. */
 static bool is_texture_semantic(const char *s)
 {
-    static const char *const WORDS[] = {"TEXCOORD", "UV",         "TANGENT",    "BINORMAL",
-                                        "IMAGE",    "TEXTANGENT", "TEXBINORMAL"};
+    static const char *const WORDS[] = {"TANGENT", "BINORMAL", "IMAGE", "TEXTANGENT",
+                                        "TEXBINORMAL"};
     for (size_t i = 0; i < sizeof WORDS / sizeof *WORDS; i++)
         if (strcmp(s, WORDS[i]) == 0)
             return true;
@@ -139,7 +161,7 @@ static bool read_vertices(struct loader *ld, struct sources *all, const xmlNode 
         if (strcmp(semantic, "POSITION") == 0) {
             if (in->position >= 0)
                 return fail_at(ld, c, "a second <input> of semantic 'POSITION'");
-            if (!get_source(ld, all, c, &in->position))
+            if (!get_source(ld, all, c, 3, &in->position))
                 return false;
         } else if (strcmp(semantic, "NORMAL") == 0) {
             /* The normals of corners win over those of vertices. */
@@ -147,9 +169,12 @@ static bool read_vertices(struct loader *ld, struct sources *all, const xmlNode 
                 continue;
             if (in->normal >= 0)
                 return fail_at(ld, c, "a second <input> of semantic 'NORMAL'");
-            if (!get_source(ld, all, c, &in->normal))
+            if (!get_source(ld, all, c, 3, &in->normal))
                 return false;
             in->normal_by_vertex = true;
+        } else if (is_uv(semantic)) {
+            if (!add_uv(ld, all, c, 0, true, in))
+                return false;
         } else if (!skip_input(ld, c, semantic)) {
             return false;
         }
@@ -189,10 +214,13 @@ bool source_read_inputs(struct loader *ld, struct sources *all, const xmlNode *p
         } else if (strcmp(semantic, "NORMAL") == 0) {
             if (in->normal >= 0 && !in->normal_by_vertex)
                 return fail_at(ld, c, "a second <input> of semantic 'NORMAL'");
-            if (!get_source(ld, all, c, &in->normal))
+            if (!get_source(ld, all, c, 3, &in->normal))
                 return false;
             in->normal_by_vertex = false;
             in->normal_offset = offset;
+        } else if (is_uv(semantic)) {
+            if (!add_uv(ld, all, c, offset, false, in))
+                return false;
         } else if (!skip_input(ld, c, semantic)) {
             return false;
         }

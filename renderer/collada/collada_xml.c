@@ -171,6 +171,8 @@ static bool survey_element(struct loader *ld, xmlNode *n, bool *has_cgl, bool *e
             *has_cgl = true;
         }
         *enter = profile == NULL || element_is_own_profile(profile);
+    } else if (element_is(n, "texture")) {
+        ld->has_textures = true;
     } else if (strncmp((const char *)n->name, "profile_", 8) == 0 &&
                !element_is(n, "profile_COMMON")) {
         *enter = false;

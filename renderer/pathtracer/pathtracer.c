@@ -180,7 +180,7 @@ static bool run(struct session *s, struct err *e)
     struct bvh *bvh = NULL;
     bool ok = false;
     if (!load_scene(o, &scene, e) || !output_check(&s->out, e) ||
-        !setup_camera(o, &scene, &camera, e) || !render_id_make(o, &id, e))
+        !setup_camera(o, &scene, &camera, e) || !render_id_make(o, &scene, &id, e))
         goto done;
     double start = now_seconds();
     bvh = bvh_build_on(&scene, (enum bvh_kind)o->accel, (enum isa)o->isa, o->threads, e);

@@ -5,13 +5,30 @@
 #include <stdio.h>
 #include <string.h>
 
-bool render_id_make(const struct options *o, struct render_id *id, struct err *e)
+/* Of all files that textures are from; "" if there are none. */
+static bool hash_images(const struct scene *s, char hex[65], struct err *e)
 {
-    char camera[65] = "none", environment[65] = "none";
+    char text[2 * 65];
+    hex[0] = '\0';
+    for (uint32_t i = 0; i < s->num_images; i++) {
+        char one[65];
+        if (!sha256_file(image_get_attr(&s->images[i], SCENE_IMAGE_FILE), one, e))
+            return false;
+        snprintf(text, sizeof text, "%s%s", hex, one);
+        sha256_text(text, hex);
+    }
+    return true;
+}
+
+bool render_id_make(const struct options *o, const struct scene *s, struct render_id *id,
+                    struct err *e)
+{
+    char camera[65] = "none", environment[65] = "none", images[65];
     *id = (struct render_id){.first_sample = (uint32_t)o->first};
     if (!sha256_file(o->scene, id->scene, e) ||
         (o->camera_file != NULL && !sha256_file(o->camera_file, camera, e)) ||
-        (o->environment_file != NULL && !sha256_file(o->environment_file, environment, e)))
+        (o->environment_file != NULL && !sha256_file(o->environment_file, environment, e)) ||
+        !hash_images(s, images, e))
         return false;
     /* The dialect by number: 0 stands for auto, which the scene file decides. */
     snprintf(id->settings, sizeof id->settings,
@@ -26,6 +43,10 @@ bool render_id_make(const struct options *o, struct render_id *id, struct err *e
         size_t n = strlen(id->settings);
         snprintf(id->settings + n, sizeof id->settings - n, "; starter %u; frame %d", o->starter,
                  o->frame);
+    }
+    if (images[0] != '\0') {
+        size_t n = strlen(id->settings);
+        snprintf(id->settings + n, sizeof id->settings - n, "; images %.32s", images);
     }
     if (o->adaptive_batch > 0)
         snprintf(id->adaptive, sizeof id->adaptive, "rule %d %.17g", o->adaptive_batch,

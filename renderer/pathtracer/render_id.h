@@ -4,6 +4,7 @@
 #define ASSAY_RENDER_ID_H
 
 #include "options.h"
+#include "renderer/scene/scene.h"
 
 struct render_id {
     char scene[65];     /* SHA-256 of the scene file, lower-case hex */
@@ -14,9 +15,9 @@ struct render_id {
     uint32_t first_sample;
 };
 
-/* Reads scene and camera file to hash them. */
-bool render_id_make(const struct options *o, struct render_id *id, struct err *e)
-    __attribute__((warn_unused_result));
+/* Reads scene and camera file and the images of the loaded scene to hash them. */
+bool render_id_make(const struct options *o, const struct scene *s, struct render_id *id,
+                    struct err *e) __attribute__((warn_unused_result));
 
 /* X Y DX DY and the W and H of the whole -> "X Y DX DY of W H". */
 void render_id_cell(const int cell[4], int width, int height, char text[64]);

@@ -84,11 +84,6 @@ static bool check_maps(const struct scene *s, const struct material *m, const ch
                    m->name);
 }
 
-static bool has_map(const struct material *m)
-{
-    return m->reflectance_map != 0 || m->radiance_map != 0;
-}
-
 static bool check_materials(const struct scene *s, const char *where, struct err *e)
 {
     for (uint32_t i = 0; i < s->num_materials; i++) {
@@ -102,7 +97,7 @@ static bool check_materials(const struct scene *s, const char *where, struct err
                            where, m->name);
         if (!is_radiometric(m->radiance))
             return err_set(e, "%s: material '%s': radiance negative or not finite", where, m->name);
-        if (has_map(m) && !check_maps(s, m, where, e))
+        if (material_has_map(m) && !check_maps(s, m, where, e))
             return false;
     }
     return true;
@@ -172,7 +167,7 @@ static bool check_objects(const struct scene *s, const char *where, struct err *
         if (o->first_triangle != triangles || o->first_sphere != spheres)
             return err_set(e, "%s: object '%s': its primitives do not follow the last object's",
                            where, o->name);
-        if (o->num_spheres > 0 && has_map(&s->materials[o->material]))
+        if (o->num_spheres > 0 && material_has_map(&s->materials[o->material]))
             return err_set(e, "%s: object '%s': a texture on a sphere", where, o->name);
         triangles += o->num_triangles;
         spheres += o->num_spheres;

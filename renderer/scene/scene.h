@@ -126,6 +126,8 @@ struct scene_camera {
     float near, far;
 };
 
+#define SCENE_IMAGE_FILE "assay:file"
+
 struct scene {
     enum dialect dialect; /* COLLADA or CGL, never AUTO */
     uint32_t num_triangles, num_spheres, num_materials, num_lights, num_objects;
@@ -139,7 +141,7 @@ struct scene {
     uint32_t *sphere_material, *sphere_object;
     int32_t *sphere_light;
     uint32_t num_images, num_textures;
-    struct image *images;     /* R G B, linear */
+    struct image *images; /* R G B, linear; where they are from is their text SCENE_IMAGE_FILE */
     struct texture *textures; /* of these images */
     struct uv *uv; /* 3 per triangle, of use where its material has a map; NULL: no map anywhere */
     struct material *materials;
@@ -164,6 +166,11 @@ struct scene {
 void scene_free(struct scene *s);
 /* Nothing scatters at all. */
 bool material_is_black(const struct material *m);
+
+static inline bool material_has_map(const struct material *m)
+{
+    return m->reflectance_map != 0 || m->radiance_map != 0;
+}
 
 /* Completes a scene whose triangles, spheres, materials, objects, camera, delta lights and
  * environment (with its light) are in place: drops nothing, appends one area light for the

@@ -3,6 +3,8 @@
  * sums are added in the order of the samples: bits then depend on the ranges, but on nothing else. */
 #include "renderer/base/cli_rewrite.h"
 #include "renderer/base/fs.h"
+#include "renderer/collada/collada.h"
+#include "renderer/image/image_oiio.h"
 #include "renderer/pathtracer/options.h"
 #include "job_kinds.h"
 
@@ -118,6 +120,20 @@ static bool add_job(struct plan *p, const int cell[4], const int *range, struct 
     return plan_job(p, word, range != NULL ? 7 : 5, (const char *const[]){NULL}, e);
 }
 
+/* The images of its textures, and what reads them. */
+static bool add_images(struct plan *p, const struct options *o, struct err *e)
+{
+    struct scene s;
+    struct path module;
+    if (!collada_load(o->scene, (enum dialect)o->dialect, &s, e))
+        return false;
+    bool ok = s.num_images == 0 || (image_oiio_file(&module, e) && plan_input(p, module.s, e));
+    for (uint32_t i = 0; ok && i < s.num_images; i++)
+        ok = plan_input(p, image_get_attr(&s.images[i], SCENE_IMAGE_FILE), e);
+    scene_free(&s);
+    return ok;
+}
+
 bool job_render_plan(int argc, char **argv, const struct plan_wishes *w, struct plan *p,
                      struct err *e)
 {
@@ -134,6 +150,7 @@ bool job_render_plan(int argc, char **argv, const struct plan_wishes *w, struct 
                         threads, ranges > 1, e);
     for (size_t i = 0; ok && i < sizeof inputs / sizeof *inputs; i++)
         ok = inputs[i] == NULL || plan_input(p, inputs[i], e);
+    ok = ok && add_images(p, &o, e);
     for (int k = 0; ok && k < num; k++) {
         int cell[4];
         cell_of(&o, parts, k, &num, cell);

@@ -239,8 +239,9 @@ bool job_render_gather_quietly(const struct plan *p, int argc, char **argv, stru
     if (ok)
         out.argc = cli_rewrite_kept(slurm, argc, argv, word);
     out.argv = word;
-    ok = ok && options_parse(out.argc, word, &o, e) && render_id_make(&o, &g.id, e) &&
-         collada_load(o.scene, (enum dialect)o.dialect, &scene, e) && find_parts(&g, e);
+    ok = ok && options_parse(out.argc, word, &o, e) &&
+         collada_load(o.scene, (enum dialect)o.dialect, &scene, e) &&
+         render_id_make(&o, &scene, &g.id, e) && find_parts(&g, e);
     if (ok)
         snprintf(out.accel, sizeof out.accel, "%s: in %d parts", bvh_kind_names[o.accel], p->num);
     if (ok && g.ranges)

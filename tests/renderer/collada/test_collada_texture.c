@@ -1,0 +1,253 @@
+/* Textures of COLLADA files: which file an image is, what its sampler says, and which coordinates an instance binds. */
+#include "renderer/base/fs.h"
+#include "renderer/collada/collada.h"
+#include "tests/support/test.h"
+
+static char dir[] = "/tmp/assay-texture-XXXXXX";
+
+/* A quadrangle with corners (0,0), (1,0), (1,1), (0,1) and two sets of coordinates: of number 4 u = 1 - x, v = y, by vertex; of
+ * number 7 u = 2 x, v = 3 y, with a third param. */
+static const char DOCUMENT[] =
+    "<COLLADA xmlns='http://www.collada.org/2005/11/COLLADASchema' version='1.4.1'><asset/>\n"
+    "<library_images>%s</library_images>\n"
+    "<library_effects><effect id='fx'><profile_COMMON><newparam sid='s'><surface type='2D'><init_from>i</init_from></surface>"
+    "</newparam><newparam sid='t'><sampler2D><source>s</source>%s</sampler2D></newparam><newparam sid='o'><sampler2D><source>s"
+    "</source></sampler2D></newparam><technique sid='c'><lambert>%s</lambert></technique></profile_COMMON></effect>"
+    "</library_effects>\n"
+    "<library_materials><material id='m'><instance_effect url='#fx'/></material></library_materials>\n"
+    "<library_geometries><geometry id='g'><mesh><source id='p'><float_array id='pa' count='12'>0 0 0 1 0 0 1 1 0 0 1 0"
+    "</float_array><technique_common><accessor source='#pa' count='4' stride='3'><param name='X' type='float'/><param name='Y' "
+    "type='float'/><param name='Z' type='float'/></accessor></technique_common></source><source id='a'><float_array id='aa' "
+    "count='8'>1 0 0 0 0 1 1 1</float_array><technique_common><accessor source='#aa' count='4' stride='2'><param name='S' "
+    "type='float'/><param name='T' type='float'/></accessor></technique_common></source><source id='b'><float_array id='ba' "
+    "count='12'>2 3 9 0 0 9 2 0 9 0 3 9</float_array><technique_common><accessor source='#ba' count='4' stride='3'><param "
+    "name='S' type='float'/><param name='T' type='float'/><param name='P' type='float'/></accessor></technique_common></source>"
+    "<vertices id='v'><input semantic='POSITION' source='#p'/>%s</vertices><polylist material='x' count='1'><input "
+    "semantic='VERTEX' source='#v' offset='0'/>%s<vcount>4</vcount><p>0 1 1 2 2 0 3 3</p></polylist></mesh></geometry>"
+    "<geometry id='ball'><extra><technique profile='ASSAY'><sphere><radius>1</radius></sphere></technique></extra></geometry>"
+    "</library_geometries>\n"
+    "<library_visual_scenes><visual_scene id='w'><node><scale>%s</scale><instance_geometry url='#%s'><bind_material>"
+    "<technique_common><instance_material symbol='x' target='#m'>%s</instance_material></technique_common></bind_material>"
+    "</instance_geometry></node></visual_scene></library_visual_scenes>\n"
+    "<scene><instance_visual_scene url='#w'/></scene></COLLADA>\n";
+
+#define BY_VERTEX "<input semantic='TEXCOORD' source='#a' set='4'/>"
+#define BY_CORNER "<input semantic='TEXCOORD' source='#b' offset='1' set='7'/>"
+#define BIND(set)                                                                                  \
+    "<bind_vertex_input semantic='UV' input_semantic='TEXCOORD' input_set='" #set "'/>"
+#define DIFFUSE "<diffuse><texture texture='t' texcoord='UV'/></diffuse>"
+
+struct pieces {
+    const char *image, *sampler, *channels, *vertices, *inputs, *scale, *geometry, *bind;
+};
+static const struct pieces PLAIN = {
+    "<image id='i'><init_from>sub/a%20%62.png</init_from></image>",
+    "<wrap_s>MIRROR</wrap_s><wrap_t>CLAMP</wrap_t><minfilter>LINEAR_MIPMAP_LINEAR</minfilter>"
+    "<magfilter>NEAREST</magfilter>",
+    DIFFUSE,
+    BY_VERTEX,
+    BY_CORNER,
+    "1 1 1",
+    "g",
+    BIND(7)};
+
+static bool load(struct pieces p, struct scene *s, struct err *e)
+{
+    char text[16384];
+    int n = snprintf(text, sizeof text, DOCUMENT, p.image, p.sampler, p.channels, p.vertices,
+                     p.inputs, p.scale, p.geometry, p.bind);
+    assert_true(n > 0 && (size_t)n < sizeof text);
+    return collada_parse(text, (size_t)n, fs_path("%s/scene.dae", dir).s, DIALECT_COLLADA, s, e);
+}
+
+/* u = a + b x, v = c y at every corner of a quadrangle that may be mirrored in x. */
+static void assert_uv(const struct scene *s, float a, float b, float c)
+{
+    assert_int_equal(s->num_triangles, 2);
+    assert_non_null(s->uv);
+    for (int k = 0; k < 6; k++) {
+        assert_near(s->uv[k].u, a + b * fabsf(s->position[k].x), 1e-6);
+        assert_near(s->uv[k].v, c * s->position[k].y, 1e-6);
+    }
+}
+
+TEST(a_texture_of_a_diffuse_surface)
+{
+    struct scene s;
+    struct err e = {""};
+    MUST(load(PLAIN, &s, &e));
+    assert_int_equal(s.num_images, 1);
+    assert_int_equal(s.num_textures, 1);
+    assert_int_equal(s.materials[0].reflectance_map, 1);
+    assert_int_equal(s.materials[0].radiance_map, 0);
+    assert_near(s.materials[0].reflectance.g, 1, 0);
+    const struct texture *t = s.textures;
+    assert_true(t->width == 3 && t->height == 2 && t->nearest);
+    assert_int_equal(t->wrap[0], TEXTURE_MIRROR);
+    assert_int_equal(t->wrap[1], TEXTURE_CLAMP);
+    /* Byte 102 is 0.4, linear ((0.4 + 0.055)/1.055)^2.4 = 0.13287; 10 is 10/255/12.92. The lower left texel is the fourth. */
+    rgb c = texture_lookup(t, (struct uv){0.1f, 0.1f});
+    assert_near(c.r, 0.13287, 1e-5);
+    assert_near(c.g, 10 / 255. / 12.92, 1e-6);
+    assert_near(c.b, 1, 1e-6);
+    assert_uv(&s, 0, 2, 3);
+    scene_free(&s);
+}
+
+TEST(coordinates_by_binding)
+{
+    struct scene s;
+    struct err e = {""};
+    struct pieces p = PLAIN;
+    p.bind = BIND(4);
+    MUST(load(p, &s, &e));
+    assert_uv(&s, 1, -1, 1);
+    scene_free(&s);
+    p.scale = "-1 1 1"; /* turns the winding */
+    MUST(load(p, &s, &e));
+    assert_uv(&s, 1, -1, 1);
+    scene_free(&s);
+    p.bind = ""; /* unbound: the first, which is that of the vertices */
+    MUST(load(p, &s, &e));
+    assert_uv(&s, 1, -1, 1);
+    scene_free(&s);
+    p.vertices = "";
+    MUST(load(p, &s, &e));
+    assert_uv(&s, 0, 2, 3);
+    scene_free(&s);
+}
+
+TEST(images_are_read_once)
+{
+    struct scene s;
+    struct err e = {""};
+    struct pieces p = PLAIN;
+    p.channels = DIFFUSE "<emission><texture texture='o' texcoord='UV'/></emission>";
+    MUST(load(p, &s, &e));
+    assert_int_equal(s.num_images, 1);
+    assert_int_equal(s.num_textures, 2);
+    assert_false(s.textures[s.materials[0].radiance_map - 1].nearest ==
+                 s.textures[s.materials[0].reflectance_map - 1].nearest);
+    assert_int_equal(s.textures[s.materials[0].radiance_map - 1].wrap[0] +
+                         s.textures[s.materials[0].radiance_map - 1].wrap[1],
+                     0);
+    assert_int_equal(s.num_lights, 1);
+    assert_true(s.lights[0].textured);
+    scene_free(&s);
+}
+
+/* Absolute names, file:// and COLLADA 1.5's <ref>; an escape that is none is a name. */
+TEST(other_names)
+{
+    static const char *const forms[] = {"%s/sub/a b.png", "file://%s/sub/a%%20b.png",
+                                        "<ref>%s/sub/a b.png</ref>", "%s/sub/50%%.png"};
+    for (int k = 0; k < 4; k++) {
+        char uri[200], image[300];
+        struct scene s;
+        struct err e = {""};
+        struct pieces p = PLAIN;
+        snprintf(uri, sizeof uri, forms[k], dir); // NOLINT(clang-diagnostic-format-nonliteral)
+        snprintf(image, sizeof image, "<image id='i'><init_from>%s</init_from></image>", uri);
+        p.image = image;
+        MUST(load(p, &s, &e));
+        assert_int_equal(s.num_images, 1);
+        scene_free(&s);
+    }
+}
+
+TEST(what_is_refused){
+#define WITH(field, text) {offsetof(struct pieces, field), text
+    static const struct {size_t field;
+const char *text, *says;
+}
+cases[] = {WITH(vertices, ""), NULL}, WITH(image, "<image id='i'/>"),
+    "scene.dae:2: <image> without <init_from>"
+}
+, WITH(image, "<image id='i'><init_from>none.png</init_from></image>"),
+    "none.png: cannot read: No such file"
+}
+, WITH(image, "<image id='i'><init_from>http://x/a.png</init_from></image>"),
+    "an image from 'http://x/a.png' is not"
+}
+, WITH(image, "<image id='i'><init_from>text.png</init_from></image>"),
+    "text.png: cannot read: not an OpenEXR, PNG"
+}
+, WITH(image, "<image id='i'><init_from>.</init_from></image>"), "cannot read: Is a directory"
+}
+, WITH(image, "<image id='i'><init_from>bright.exr</init_from></image>"),
+    "'m': reflectance outside [0,1] in its texture"
+}
+, WITH(sampler, "<wrap_s>MIRROR_ONCE</wrap_s>"),
+    "scene.dae:3: <wrap_s> 'MIRROR_ONCE' is not supported"
+}
+, WITH(sampler, "<magfilter>CUBIC</magfilter>"), "<magfilter> 'CUBIC' is not supported"
+}
+, WITH(sampler, "<wrap_t>BORDER</wrap_t><border_color>1 0 0 1</border_color>"),
+    "<border_color> that is not black"
+}
+, WITH(geometry, "ball"), "scene.dae:6: a texture on a surface without texture coordinates"
+}
+, WITH(bind, BIND(5)), "scene.dae:6: no set 5 of texture coordinates"
+}
+, WITH(channels, DIFFUSE "<emission><texture texture='t' texcoord='OTHER'/></emission>"),
+    "a second set of texture coordinates in one material"
+}
+, WITH(channels, "<diffuse><texture texture='t'/><color>1 1 1</color></diffuse>"),
+    "unexpected <color> in <diffuse>"
+}
+,
+    WITH(
+        inputs,
+        "<input semantic='TEXCOORD' source='#p' offset='1'/><input semantic='TEXCOORD' source='#c' offset='1'/>"),
+    "no element with id 'c'"
+}
+,
+}
+;
+#undef WITH
+for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+    struct scene s;
+    struct err e = {""};
+    struct pieces p = PLAIN;
+    memcpy((char *)&p + cases[k].field, &cases[k].text, sizeof cases[k].text);
+    if (cases[k].says == NULL) {
+        MUST(load(p, &s, &e));
+        scene_free(&s);
+        continue;
+    }
+    REFUSES(load(p, &s, &e), cases[k].says);
+}
+struct scene s;
+struct err e = {""};
+struct pieces p = PLAIN;
+p.vertices = p.inputs = "";
+p.inputs = "<input semantic='NORMAL' source='#p' offset='1'/>";
+REFUSES(load(p, &s, &e), "a texture on a surface without texture coordinates");
+}
+
+static int setup(void **state)
+{
+    (void)state;
+    struct err e;
+    struct image bright;
+    const uint8_t pixel[3 * 6] = {0, 0, 0, 1, 1, 1, 2, 2, 2, 102, 10, 255, 4, 4, 4, 5, 5, 5};
+    if (mkdtemp(dir) == NULL || !fs_make_dirs(fs_path("%s/sub", dir).s, &e) ||
+        !image_write_png(fs_path("%s/sub/a b.png", dir).s, 3, 2, pixel, &e) ||
+        !image_write_png(fs_path("%s/sub/50%%.png", dir).s, 3, 2, pixel, &e) ||
+        !image_alloc(&bright, 2, 2, 3, (const char *const[]){"R", "G", "B"}, &e))
+        return -1;
+    bright.data[4] = 1.5f;
+    bool ok = image_write_exr(fs_path("%s/bright.exr", dir).s, &bright, &e);
+    image_free(&bright);
+    FILE *f = fopen(fs_path("%s/text.png", dir).s, "w");
+    return ok && f != NULL && fputs("no image", f) > 0 && fclose(f) == 0 ? 0 : -1;
+}
+
+static int teardown(void **state)
+{
+    (void)state;
+    struct err e;
+    return fs_remove_tree(dir, &e) ? 0 : -1;
+}
+
+TEST_GROUP(setup, teardown)
