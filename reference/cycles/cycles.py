@@ -100,6 +100,7 @@ def rescale(dump):
         m["positions"] = scale * np.array(m["positions"], float).reshape(-1, 3, 3)
         if m["normals"] is not None:
             m["normals"] = np.array(m["normals"], float).reshape(-1, 3, 3)
+        m["uv"] = np.array(m["uv"], float).reshape(-1, 3, 2) if "uv" in m else None
     for s in dump["spheres"]:
         s["centre"], s["radius"] = [scale * x for x in s["centre"]], scale * s["radius"]
     for light in dump["lights"]:
@@ -118,15 +119,19 @@ def build(dump):
         # No setting of Cycles ends a path at the camera's first hit: let nothing reflect.
         for m in dump["materials"]:
             m["kind"], m["reflectance"] = "diffuse", [0.0, 0.0, 0.0]
+            m.pop("reflectance_map", None)
     upper_half = (dump["environment"] or {}).get("kind") == "upper_half"
     if bpy.app.version >= (3, 5, 0) and (dump["lights"] or upper_half) and any(m["kind"] == "microfacet" for m in dump["materials"]):
         raise ValueError("rough metals under lights without area need Blender 3.4: Glossy of later versions has correlated shadowing")
     materials = [add_material(m) for m in dump["materials"]]
     for m in dump["meshes"]:
-        positions, normals = m["positions"], m["normals"]
+        corners = m["positions"], m["normals"], m["uv"]
         if any(dump["materials"][m["material"]]["radiance"]):
-            positions, normals = cut_emitter(positions, normals)
-        add_mesh(m["name"], materials[m["material"]], positions, normals)
+            positions, normals, uv = cut_emitter(*corners)
+            if normals is not None:
+                normals /= np.linalg.norm(normals, axis=2, keepdims=True)
+            corners = positions, normals, uv
+        add_mesh(m["name"], materials[m["material"]], *corners)
     exact = {}
     for s in dump["spheres"]:
         if s["exact"]:
@@ -155,9 +160,12 @@ def main():
         seeds = json.load(f)
     if dump["assay_cycles"] != 2:
         raise ValueError(f"{args.scene}: unknown version of the dump")
-    if dump["environment"] is not None and "file" in dump["environment"]:
-        dump["environment"]["file"] = os.path.join(os.path.dirname(os.path.abspath(args.scene)),
-                                                   dump["environment"]["file"])
+    images = [dump["environment"]] + [m.get(key) for m in dump["materials"]
+                                      for key in ("reflectance_map", "radiance_map")]
+    for image in images:
+        if image is not None and "file" in image:
+            image["file"] = os.path.join(os.path.dirname(os.path.abspath(args.scene)),
+                                         image["file"])
     bpy.ops.wm.read_factory_settings(use_empty=True)
     rescale(dump)
     set_options(dump, args.spp, args.threads)

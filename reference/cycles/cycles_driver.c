@@ -206,9 +206,13 @@ static bool write_key(const struct reference_job *job, const char *path, struct 
     return export_cycles(job->scene, job->camera, job->suite->depth, path, e);
 }
 
-static const char *const scripts[] = {"cycles/cycles.py",          "cycles/cycles_blender.py",
-                                      "cycles/cycles_geometry.py", "cycles/cycles_light.py",
-                                      "cycles/cycles_material.py", NULL};
+static const char *const scripts[] = {"cycles/cycles.py",
+                                      "cycles/cycles_blender.py",
+                                      "cycles/cycles_geometry.py",
+                                      "cycles/cycles_light.py",
+                                      "cycles/cycles_material.py",
+                                      "cycles/cycles_texture.py",
+                                      NULL};
 
 const struct engine_driver cycles_driver = {.program = "blender",
                                             .scripts = scripts,

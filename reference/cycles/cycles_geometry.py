@@ -5,6 +5,7 @@ import bpy
 import numpy as np
 
 from cycles_blender import V, add_object
+from cycles_texture import UV_LAYER
 
 ICOSPHERE_LEVEL = 5
 # Of glass: what is seen through it depends on where a ray leaves the mesh.
@@ -27,22 +28,17 @@ def cut_triangle(corners, n):
     return a + uv[..., :1] * (b - a) + uv[..., 1:] * (c - a)
 
 
-def cut_emitter(positions, normals):
-    """Triangles [t, corner, xyz] into as many pieces as exact sampling takes."""
+def cut_emitter(positions, *others):
+    """Triangles [t, corner, xyz] into as many pieces as exact sampling takes, and what else corners have, or None."""
     pieces = []
-    for k, p in enumerate(positions):
+    for p in positions:
         area2 = np.linalg.norm(np.cross(p[1] - p[0], p[2] - p[0]))
-        n = max(1, math.ceil((area2 / NEAR_PLANE) ** (1 / 3)))
-        pieces.append((cut_triangle(p, n),
-                       None if normals is None else cut_triangle(normals[k], n)))
-    positions = np.concatenate([p for p, _ in pieces])
-    if normals is not None:
-        normals = np.concatenate([n for _, n in pieces])
-        normals /= np.linalg.norm(normals, axis=2, keepdims=True)
-    return positions, normals
+        pieces.append(max(1, math.ceil((area2 / NEAR_PLANE) ** (1 / 3))))
+    return [None if a is None else np.concatenate([cut_triangle(c, n) for c, n in zip(a, pieces)])
+            for a in (positions, *others)]
 
 
-def add_mesh(name, material, positions, normals=None):
+def add_mesh(name, material, positions, normals=None, uv=None):
     """[t, corner, xyz]. Triangles share no vertices: Cycles keeps one normal per vertex."""
     mesh = bpy.data.meshes.new(name)
     count = len(positions)
@@ -57,6 +53,8 @@ def add_mesh(name, material, positions, normals=None):
             mesh.use_auto_smooth = True
             mesh.auto_smooth_angle = math.pi
         mesh.normals_split_custom_set(normals.reshape(-1, 3).tolist())
+    if uv is not None:
+        mesh.uv_layers.new(name=UV_LAYER).data.foreach_set("uv", uv.ravel())
     mesh.update()
     return add_object(name, mesh)
 

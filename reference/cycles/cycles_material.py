@@ -10,6 +10,7 @@ import math
 import bpy
 
 from cycles_blender import V, Nodes, Vector, choose
+from cycles_texture import textured
 
 # Largest 32-bit number below 1.
 ALMOST_1 = 1 - 2.0 ** -24
@@ -167,7 +168,8 @@ def microfacet(nodes, m):
 
 
 def diffuse(nodes, m):
-    return nodes.node("BsdfDiffuse", (*m["reflectance"], 1), 0.0).outputs[0]
+    return nodes.node("BsdfDiffuse", textured(nodes, m["reflectance"], m.get("reflectance_map")),
+                      0.0).outputs[0]
 
 
 SCATTERING = {"diffuse": diffuse, "mirror": mirror, "refraction": dielectric, "glass": dielectric,
@@ -182,7 +184,8 @@ def add_material(m):
     if any(m["radiance"]):
         strength = 1.0 if m["both_sides"] else 1.0 - nodes.geometry("Backfacing")
         surface = nodes.add_shaders(
-            surface, nodes.node("Emission", (*m["radiance"], 1), strength).outputs[0])
+            surface, nodes.node("Emission", textured(nodes, m["radiance"], m.get("radiance_map")),
+                                strength).outputs[0])
         if V < (3, 5, 0):
             material.cycles.sample_as_light = True
         else:

@@ -59,13 +59,14 @@ bool export_cycles(const struct scene *s, const struct camera *c, int depth, con
     struct err why = {"out of memory"};
     char image[4096 + 8];
     bool image_written = false;
+    uint32_t textures_written = 0;
     if (depth > MAX_DEPTH)
         return err_set(e, "Cycles: depth %d, at most %d are possible", depth, MAX_DEPTH);
     if (strlen(path) >= sizeof image - 4)
         return err_set(e, "%.64s...: path too long", path);
     snprintf(image, sizeof image, "%s.exr", path);
-    bool ok = features_check_textures("Cycles", s, &why) &&
-              (materials = cycles_materials(s, &why)) != NULL &&
+    bool ok = cycles_write_textures(s, path, &textures_written, &why) &&
+              (materials = cycles_materials(s, path, &why)) != NULL &&
               (camera = camera_json(s, c, &why)) != NULL &&
               (meshes = cycles_meshes(s, &why)) != NULL &&
               (environment = cycles_environment(s, image, &image_written, &why)) != NULL;
@@ -79,6 +80,8 @@ bool export_cycles(const struct scene *s, const struct camera *c, int depth, con
     }
     if (!ok && image_written)
         unlink(image);
+    if (!ok)
+        cycles_remove_textures(path, textures_written);
     json_decref(root);
     json_decref(camera);
     json_decref(materials);

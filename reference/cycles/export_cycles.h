@@ -14,13 +14,17 @@
  *   "materials": [{"name", "kind": "diffuse", "mirror", "refraction", "glass" or "microfacet",
  *                  "reflectance": [r,g,b] (of both sides), "radiance": [r,g,b],
  *                  "both_sides": emits from the back too,
+ *                  "reflectance_map", "radiance_map" (each only if there is one): {"file": an EXR of linear texels beside the dump,
+ *                         "sha256" of it, "size": [w, h] and "pad": [x, y] black texels around that, "wrap": [of u, of v]
+ *                         "repeat", "mirror" or "clamp", "nearest"} the colour is multiplied by,
  *                  refraction and glass: "transmittance": [r,g,b], "ior" (as struct material has it),
  *                                        "schlick",
  *                  microfacet: "distribution": "ggx" or "beckmann", "alpha", "separable",
  *                              "eta", "k": [r,g,b] or null (then reflectance at any angle),
  *                              "facets": true: by random facets; false: Blender's own closure does}]
  *   "meshes": [{"name", "material": index, "positions": [9 numbers a triangle],
- *               "normals": [9 numbers a triangle], on the geometric normal's side, or null: flat}]
+ *               "normals": [9 numbers a triangle], on the geometric normal's side, or null: flat,
+ *               "uv": [6 numbers a triangle], only if the material has a map}]
  *   "spheres": [{"name", "material", "centre": [x,y,z], "radius", "normal_out": +1 or -1,
  *                "exact": true: seen from outside only, opaque and dark, so an analytic point will
  *                         do; false: needs a mesh}]
@@ -35,7 +39,7 @@
 
 #include "renderer/scene/camera.h"
 
-/* Writes the dump, and an environment's image to <path>.exr, each by rename. Fails on a write error,
+/* Writes the dump, an environment's image to <path>.exr and texture N's to <path>.textureN.exr, each by rename. Fails on a write error,
  * and with a line that starts with "Cycles: " on what our recipe for Cycles cannot express: pixels
  * that are not square, an angle of view out of Blender's range, clipping planes that cut geometry, a
  * depth above 1025, shading normals of one triangle on both of its sides, a microfacet that takes

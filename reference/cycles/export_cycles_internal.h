@@ -26,10 +26,16 @@ json_t *cycles_name(const char *name);
 void cycles_push(json_t **array, json_t *value);
 
 /* Parts of the dump; NULL with a line in *e if the recipe cannot express them. */
-json_t *cycles_materials(const struct scene *s, struct err *e);
+json_t *cycles_materials(const struct scene *s, const char *dump, struct err *e);
 json_t *cycles_meshes(const struct scene *s, struct err *e);
 json_t *cycles_spheres(const struct scene *s, vec3 eye);
 json_t *cycles_lights(const struct scene *s);
+/* Textures, each an EXR of its linear texels beside the dump; *written: how many, also where it fails. */
+bool cycles_write_textures(const struct scene *s, const char *dump, uint32_t *written,
+                           struct err *e);
+void cycles_remove_textures(const char *dump, uint32_t written);
+/* What the dump says of a map; its image has been written. */
+json_t *cycles_map(const struct scene *s, uint32_t map, const char *dump);
 /* An image goes to image_path, by rename; *image_written tells if so. */
 json_t *cycles_environment(const struct scene *s, const char *image_path, bool *image_written,
                            struct err *e);

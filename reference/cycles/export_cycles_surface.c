@@ -41,6 +41,22 @@ static const char *const KIND[NUM_MATERIAL_KINDS] = {[MATERIAL_DIFFUSE] = "diffu
                                                      [MATERIAL_GLASS] = "glass",
                                                      [MATERIAL_MICROFACET] = "microfacet"};
 
+/* Adds the maps of a material that has some. */
+static json_t *with_maps(json_t *o, const struct scene *s, const struct material *m,
+                         const char *dump)
+{
+    bool ok =
+        o != NULL &&
+        (m->reflectance_map == 0 ||
+         json_object_set_new(o, "reflectance_map", cycles_map(s, m->reflectance_map, dump)) == 0) &&
+        (m->radiance_map == 0 ||
+         json_object_set_new(o, "radiance_map", cycles_map(s, m->radiance_map, dump)) == 0);
+    if (ok)
+        return o;
+    json_decref(o);
+    return NULL;
+}
+
 static json_t *reflection(const struct material *m)
 {
     json_t *o = json_pack("{so,ss,so,so,sb}", "name", cycles_name(m->name), "kind", KIND[m->kind],
@@ -66,7 +82,7 @@ static json_t *reflection(const struct material *m)
     return o;
 }
 
-json_t *cycles_materials(const struct scene *s, struct err *e)
+json_t *cycles_materials(const struct scene *s, const char *dump, struct err *e)
 {
     json_t *out = json_array();
     const char *light = unsampled_light(s);
@@ -87,7 +103,7 @@ json_t *cycles_materials(const struct scene *s, struct err *e)
             json_decref(out);
             return NULL;
         }
-        cycles_push(&out, reflection(m));
+        cycles_push(&out, with_maps(reflection(m), s, m, dump));
     }
     return out;
 }
@@ -97,6 +113,12 @@ static void push3(json_t **array, vec3 v, float sign)
     cycles_push(array, json_real(sign * v.x));
     cycles_push(array, json_real(sign * v.y));
     cycles_push(array, json_real(sign * v.z));
+}
+
+static void push_uv(json_t **array, struct uv uv)
+{
+    cycles_push(array, json_real((double)uv.u));
+    cycles_push(array, json_real((double)uv.v));
 }
 
 /* A triangle's shading normals: +1 all on the geometric normal's side, -1 all on the other (the
@@ -121,7 +143,8 @@ static int normals_side(const vec3 *p, const vec3 *n, bool *flat)
 static bool push_mesh(json_t **out, const struct scene *s, const struct object *o, bool smooth,
                       struct err *e)
 {
-    json_t *positions = json_array(), *normals = json_array();
+    json_t *positions = json_array(), *normals = json_array(), *uvs = json_array();
+    const bool has_map = material_has_map(&s->materials[o->material]);
     bool ok = true;
     for (uint32_t i = o->first_triangle; ok && i < o->first_triangle + o->num_triangles; i++) {
         const vec3 *p = s->position + 3 * (size_t)i, *n = s->normal + 3 * (size_t)i;
@@ -135,12 +158,21 @@ static bool push_mesh(json_t **out, const struct scene *s, const struct object *
             push3(&positions, p[k], 1);
             if (smooth)
                 push3(&normals, n[k], (float)side);
+            if (has_map)
+                push_uv(&uvs, s->uv[3 * (size_t)i + (size_t)k]);
         }
     }
-    if (ok && (positions == NULL || json_array_size(positions) > 0))
-        cycles_push(out, json_pack("{so,si,sO,sO}", "name", cycles_name(o->name), "material",
-                                   (int)o->material, "positions", positions, "normals",
-                                   smooth ? normals : json_null()));
+    if (ok && (positions == NULL || json_array_size(positions) > 0)) {
+        json_t *mesh =
+            json_pack("{so,si,sO,sO}", "name", cycles_name(o->name), "material", (int)o->material,
+                      "positions", positions, "normals", smooth ? normals : json_null());
+        if (has_map && json_object_set(mesh, "uv", uvs) != 0) {
+            json_decref(mesh);
+            mesh = NULL;
+        }
+        cycles_push(out, mesh);
+    }
+    json_decref(uvs);
     json_decref(positions);
     json_decref(normals);
     return ok;

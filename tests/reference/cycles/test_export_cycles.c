@@ -266,6 +266,44 @@ TEST_WITH(cameras_that_cycles_lacks_are_refused, setup, teardown)
     assert_refused(f, 1, "geometry, at distance 0 to");
 }
 
+/* A border makes the image one texel larger in that direction alone, and all of what is left is black; coordinates are those of the
+ * corners, in the triangles' order. */
+TEST_WITH(textures_are_images_beside_the_dump, setup, teardown)
+{
+    struct fixture *f = *state;
+    const rgb texels[2] = {{.1f, .2f, 3}, {.4f, .5f, .6f}};
+    struct image im;
+    struct err e = {""};
+    uint32_t map = build_texture(&f->s, 2, 1, texels, true, TEXTURE_MIRROR);
+    f->s.textures[map - 1].wrap[1] = TEXTURE_BORDER;
+    f->s.materials[1].radiance_map = map;
+    f->s.lights[3].textured = true;
+    char *text = dump(f, 1);
+    char file[300];
+    snprintf(file, sizeof file, "%s.texture0.exr", f->path);
+    MUST(image_read_colours(file, &im, &e));
+    assert_true(im.width == 2 && im.height == 3);
+    for (int i = 0; i < 6; i++) {
+        const rgb want = i / 2 == 1 ? texels[i % 2] : grey(0);
+        assert_memory_equal(im.data + 3 * i, &want, sizeof want);
+    }
+    image_free(&im);
+    if (strstr(
+            text,
+            "\"wrap\":[\"mirror\",\n\"clamp\"],\n\"size\":[2,1],\n\"pad\":[0,1],\n\"nearest\":true}") ==
+            NULL ||
+        strstr(text, "\"radiance_map\":{\n\"file\":\"scene.json.texture0.exr\",\n\"sha256\":\"") ==
+            NULL ||
+        strstr(text, "\"uv\":[0.0,0.0,1.0,0.0,1.0,1.0,0.0,0.0,1.0,1.0,0.0,1.0]") == NULL ||
+        strstr(text, "reflectance_map") != NULL)
+        fail_msg("%s", text);
+    free(text);
+    assert_int_equal(unlink(file), 0);
+    f->c.tan_v *= 2;
+    assert_refused(f, 1, "pixels are not square");
+    assert_int_equal(access(file, F_OK), -1);
+}
+
 /* Squares at depths 1, 4 and 9, with sides of 1, 2 and 2: distances 1 to 1.22, 4 to 4.24, 9 to 9.11. A plane between two
  * by distance is put half way between them by depth; one that cuts through the first is refused. */
 TEST_WITH(planes_between_whole_surfaces_clip_by_depth, setup, teardown)
