@@ -18,6 +18,10 @@ enum { MAX_DEPTH = 1025 }; /* Blender's limit of 1024 bounces is one less than o
 
 static json_t *camera_json(const struct scene *s, const struct camera *c, struct err *e)
 {
+    if (c->is_orthographic) {
+        err_set(e, "Cycles: an orthographic camera is not verified");
+        return NULL;
+    }
     if (c->lens_radius > 0 && !(c->focal_distance > 0)) {
         err_set(e, "Cycles: a lens that focuses at distance %g", (double)c->focal_distance);
         return NULL;

@@ -75,6 +75,8 @@ static bool check_camera(const struct scene *s, const struct camera *c, double e
 {
     double nearest, farthest;
     features_distances(s, c->eye, &nearest, &farthest);
+    if (c->is_orthographic)
+        return err_set(e, "POV-Ray: an orthographic camera is not verified");
     if (c->lens_radius > 0)
         return err_set(e, "POV-Ray's depth of field is not verified: the lens must be a pinhole");
     if (!(extent >= MIN_EXTENT && fmax(extent, farthest) <= MAX_REACH))

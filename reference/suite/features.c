@@ -274,6 +274,8 @@ bool features_check_textures(const char *engine, const struct scene *s, struct e
 bool features_check_exportable(const char *engine, const struct scene *s, const struct camera *c,
                                struct err *e)
 {
+    if (c->is_orthographic)
+        return err_set(e, "%s: an orthographic camera cannot be expressed", engine);
     return features_check_camera(engine, s, c, e) && features_check_normals(engine, s, e) &&
            features_check_textures(engine, s, e);
 }

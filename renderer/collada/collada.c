@@ -8,19 +8,35 @@
 #include <string.h>
 #include <strings.h>
 
+/* What coordinates mean: of a document, or of an element with an <asset> of its own. */
+struct frame {
+    const xmlDoc *doc;
+    double unit; /* metres */
+    int up;      /* index into AXES */
+};
+
 /* Where the walk is: one per level, so that a node that contains itself is seen. */
 struct place {
     const struct place *above;
     const xmlNode *node;
+    struct frame frame;
     mat4 to_world;
     int depth;
 };
 
-static bool read_asset(struct loader *ld, const xmlNode *root, mat4 *axes)
+/* To Y_UP, by the table of the specification. */
+static const struct axes {
+    const char *name;
+    double m[3][3];
+} AXES[] = {{"Y_UP", {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}},
+            {"X_UP", {{0, -1, 0}, {1, 0, 0}, {0, 0, 1}}},
+            {"Z_UP", {{1, 0, 0}, {0, 0, 1}, {0, -1, 0}}}};
+
+/* The element's own <asset>, on top of what is in *f. */
+static bool read_asset(struct loader *ld, const xmlNode *element, struct frame *f)
 {
     xmlNode *asset, *unit, *up;
-    *axes = mat4_identity();
-    if (!element_one_child(ld, root, "asset", &asset))
+    if (!element_one_child(ld, element, "asset", &asset))
         return false;
     if (asset == NULL)
         return true;
@@ -35,24 +51,49 @@ static bool read_asset(struct loader *ld, const xmlNode *root, mat4 *axes)
     if (meter != NULL && ld->dialect == DIALECT_COLLADA) {
         char *end;
         bool plain = meter[0] != '\0' && meter[strspn(meter, "0123456789+-.eE")] == '\0';
-        ld->unit = strtod(meter, &end);
-        if (!plain || *end != '\0' || !(ld->unit >= 1e-18 && ld->unit <= FARTHEST))
+        f->unit = strtod(meter, &end);
+        if (!plain || *end != '\0' || !(f->unit >= 1e-18 && f->unit <= FARTHEST))
             return fail_at(ld, unit, "<unit>: meter=\"%.60s\" is not a positive number", meter);
     }
     if (up == NULL)
         return true;
+    if (element_is_one_of(element, "camera light library_cameras library_lights"))
+        return fail_at(ld, up, "<up_axis> of a <%s> is not supported", (const char *)element->name);
     char *axis = text_read_word(ld, up);
     if (axis == NULL)
         return false;
-    bool known = true;
-    if (strcmp(axis, "X_UP") == 0)
-        *axes = (mat4){{{0, 1, 0, 0}, {1, 0, 0, 0}, {0, 0, -1, 0}, {0, 0, 0, 1}}};
-    else if (strcmp(axis, "Z_UP") == 0)
-        *axes = (mat4){{{-1, 0, 0, 0}, {0, 0, 1, 0}, {0, 1, 0, 0}, {0, 0, 0, 1}}};
-    else
-        known = strcmp(axis, "Y_UP") == 0 || fail_at(ld, up, "unknown <up_axis> '%.60s'", axis);
+    int i = 2;
+    while (i >= 0 && strcmp(axis, AXES[i].name) != 0)
+        i--;
+    bool known = i >= 0 || fail_at(ld, up, "unknown <up_axis> '%.60s'", axis);
+    f->up = i;
     free(axis);
     return known;
+}
+
+/* From the frame outside to that of an element; *change takes coordinates from there to outside. */
+static bool enter(struct loader *ld, const xmlNode *element, const struct frame *outside,
+                  struct frame *inside, mat4 *change)
+{
+    *inside = *outside;
+    if (element->doc != outside->doc) {
+        *inside = (struct frame){.doc = element->doc, .unit = 1};
+        if (!read_asset(ld, xmlDocGetRootElement(element->doc), inside))
+            return false;
+    }
+    bool is_in_library = strncmp((const char *)element->parent->name, "library_", 8) == 0;
+    if ((is_in_library && !read_asset(ld, element->parent, inside)) ||
+        !read_asset(ld, element, inside))
+        return false;
+    *change = mat4_identity();
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            change->m[i][j] = 0;
+            for (int k = 0; k < 3; k++)
+                change->m[i][j] += AXES[outside->up].m[k][i] * AXES[inside->up].m[k][j] *
+                                   (inside->unit / outside->unit);
+        }
+    return true;
 }
 
 static bool read_matrix(struct loader *ld, const xmlNode *n, mat4 *out)
@@ -82,6 +123,25 @@ static bool read_lookat(struct loader *ld, const xmlNode *n, mat4 *out)
     return true;
 }
 
+/* Points move along the second axis by the tangent of the angle times how far they are along the
+ * first. */
+static bool read_skew(struct loader *ld, const xmlNode *n, mat4 *out)
+{
+    double v[7];
+    if (!text_read_exactly(ld, n, v, 7))
+        return false;
+    dvec3 from = d3(v[1], v[2], v[3]), along = d3(v[4], v[5], v[6]);
+    if (!d3_normalize(&from) || !d3_normalize(&along))
+        return fail_at(ld, n, "<skew> by an axis of no length");
+    along = d3_scale(along, tan(v[0] * (3.14159265358979323846 / 180)));
+    const mat4 shift = mat4_columns(d3_scale(along, from.x), d3_scale(along, from.y),
+                                    d3_scale(along, from.z), d3(0, 0, 0));
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            out->m[i][j] += shift.m[i][j];
+    return true;
+}
+
 /* The element's matrix, which is the identity for what is no transform. */
 static bool read_transform(struct loader *ld, const xmlNode *n, mat4 *out)
 {
@@ -92,7 +152,7 @@ static bool read_transform(struct loader *ld, const xmlNode *n, mat4 *out)
     if (element_is(n, "lookat"))
         return read_lookat(ld, n, out);
     if (element_is(n, "skew"))
-        return fail_at(ld, n, "<skew> is not supported");
+        return read_skew(ld, n, out);
     if (element_is(n, "translate")) {
         if (!text_read_exactly(ld, n, v, 3))
             return false;
@@ -127,26 +187,31 @@ static bool instance_geometry(struct loader *ld, const xmlNode *instance, const 
 {
     const xmlNode *geometry;
     const struct mesh *mesh;
+    struct frame inside;
+    mat4 change;
     double sign;
     uint32_t material;
     size_t set;
     const char *name = name_of(at->node);
-    if (!element_follow(ld, instance, "url", "geometry", &geometry) ||
-        !build_transform_sign(ld, instance, &at->to_world, &sign) ||
-        !geometry_get(ld, geometry, &mesh))
+    if (!reference_follow(ld, instance, "url", "geometry", &geometry) ||
+        !enter(ld, geometry, &at->frame, &inside, &change) || !geometry_get(ld, geometry, &mesh))
+        return false;
+    const mat4 to_world = mat4_mul(&at->to_world, &change);
+    if (!build_transform_sign(ld, instance, &to_world, &sign))
         return false;
     if (mesh->is_sphere)
         return material_get(ld, instance, geometry, NULL, NULL, &material, &set) &&
-               build_begin_object(ld, name, NULL, material, false) &&
-               build_add_sphere(ld, instance, &at->to_world, mesh->radius, mesh->normal_out);
+               (material == NO_SURFACE ||
+                (build_begin_object(ld, name, NULL, material, false) &&
+                 build_add_sphere(ld, instance, &to_world, mesh->radius, mesh->normal_out)));
     for (size_t g = 0; g < mesh->num_groups; g++) {
         const struct mesh_group *group = &mesh->groups[g];
-        if (group->symbol == NULL && ld->dialect == DIALECT_COLLADA)
-            return fail_at(ld, group->node, "<%s> without attribute 'material'",
-                           (const char *)group->node->name);
         const char *suffix = mesh->num_groups > 1 ? group->symbol : NULL;
-        if (!material_get(ld, instance, group->node, group->symbol, group, &material, &set) ||
-            !build_begin_object(ld, name, suffix, material, false))
+        if (!material_get(ld, instance, group->node, group->symbol, group, &material, &set))
+            return false;
+        if (material == NO_SURFACE)
+            continue;
+        if (!build_begin_object(ld, name, suffix, material, false))
             return false;
         const bool uses_uv = material_has_map(&ld->scene.materials[material]);
         for (size_t t = group->first; t < group->first + group->count; t++) {
@@ -154,7 +219,7 @@ static bool instance_geometry(struct loader *ld, const xmlNode *instance, const 
             struct uv uv[3];
             for (int k = 0; uses_uv && k < 3; k++)
                 uv[k] = mesh->uv[c[k].uv + set];
-            if (!build_add_triangle(ld, instance, &at->to_world, sign, c, uses_uv ? uv : NULL))
+            if (!build_add_triangle(ld, instance, &to_world, sign, c, uses_uv ? uv : NULL))
                 return false;
         }
     }
@@ -167,7 +232,7 @@ static bool instance_node(struct loader *ld, const xmlNode *instance, const stru
 {
     const xmlNode *node;
     if (!element_only_children(ld, instance, "extra") ||
-        !element_follow(ld, instance, "url", "node", &node))
+        !reference_follow(ld, instance, "url", "node", &node))
         return false;
     for (const struct place *p = at; p != NULL; p = p->above)
         if (p->node == node)
@@ -179,34 +244,42 @@ static bool instance_node(struct loader *ld, const xmlNode *instance, const stru
 static bool read_content(struct loader *ld, const xmlNode *c, const struct place *at)
 {
     const xmlNode *target;
+    struct frame inside;
+    mat4 change;
     if (element_is(c, "node"))
         return walk(ld, c, at);
     if (element_is(c, "instance_node"))
         return instance_node(ld, c, at);
     if (element_is(c, "instance_geometry"))
         return instance_geometry(ld, c, at);
-    if (element_is(c, "instance_light"))
-        return element_follow(ld, c, "url", "light", &target) &&
-               light_instance(ld, c, target, name_of(at->node), &at->to_world);
-    if (element_is(c, "instance_camera"))
-        return element_follow(ld, c, "url", "camera", &target) &&
-               camera_instance(ld, c, target, &at->to_world);
-    if (element_is_one_of(c, "matrix lookat translate rotate scale asset extra"))
+    bool is_light = element_is(c, "instance_light");
+    if (is_light || element_is(c, "instance_camera")) {
+        if (!reference_follow(ld, c, "url", is_light ? "light" : "camera", &target) ||
+            !enter(ld, target, &at->frame, &inside, &change))
+            return false;
+        ld->unit = inside.unit;
+        return is_light ? light_instance(ld, c, target, name_of(at->node), &at->to_world)
+                        : camera_instance(ld, c, target, name_of(at->node), &at->to_world);
+    }
+    if (element_is_one_of(c, "matrix lookat translate rotate scale skew asset extra"))
         return true;
     if (element_is(c, "instance_controller"))
-        return fail_at(ld, c, "<instance_controller> is not supported");
+        return fail_at(ld, c, "<instance_controller>: skins and morphs are not supported");
     return element_fail_unexpected(ld, c);
 }
 
 static bool walk(struct loader *ld, const xmlNode *node, const struct place *above)
 {
-    struct place at = {above, node, above->to_world, above->depth + 1};
+    struct place at = {.above = above, .node = node, .depth = above->depth + 1};
+    mat4 m;
     if (at.depth > MAX_NODE_DEPTH)
         return fail_at(ld, node, "nodes nested deeper than %d", MAX_NODE_DEPTH);
     if (ld->num_nodes++ >= MAX_NODES)
         return fail_at(ld, node, "more than %d instances of nodes", MAX_NODES);
+    if (!enter(ld, node, &above->frame, &at.frame, &m))
+        return false;
+    at.to_world = mat4_mul(&above->to_world, &m);
     for (const xmlNode *c = element_first_child(node); c != NULL; c = element_next_sibling(c)) {
-        mat4 m;
         if (!read_transform(ld, c, &m))
             return false;
         at.to_world = mat4_mul(&at.to_world, &m);
@@ -229,12 +302,19 @@ static void write_notes(struct loader *ld)
 {
     static const char *const LEFT_OUT[NUM_LEFT_OUT] = {
         "%u animations, controllers or bodies are left out: a still image shows where things stand",
-        "%u groups of lines are left out"};
+        "%u groups of lines are left out", "%u surfaces are wholly transparent, so left out",
+        "%u surfaces without material are grey (0.8)"};
     for (int i = 0; i < NUM_LEFT_OUT; i++) {
         char text[128];
         snprintf(text, sizeof text, LEFT_OUT[i], ld->num_left_out[i]);
         if (ld->num_left_out[i] > 0)
             add_note(ld, text);
+    }
+    if (ld->scene.num_cameras > 1 && ld->dialect == DIALECT_COLLADA) {
+        char text[160];
+        snprintf(text, sizeof text, "the first of %u cameras, '%s' (--list-cameras, --camera NAME)",
+                 ld->scene.num_cameras, ld->scene.camera.name);
+        add_note(ld, text);
     }
     if (ld->is_course_export)
         add_note(ld, "written by Blender 2.72 or 2.74, so read as a scene of CS184 (--dialect "
@@ -288,20 +368,24 @@ static bool find_visual_scene(struct loader *ld, const xmlNode *root, const xmlN
     if (instance == NULL)
         return fail_at(ld, scene, "<scene> without <instance_visual_scene>");
     return element_only_children(ld, instance, "extra") &&
-           element_follow(ld, instance, "url", "visual_scene", out);
+           reference_follow(ld, instance, "url", "visual_scene", out);
 }
 
-static bool read_scene(struct loader *ld)
+static bool read_scene(struct loader *ld, const xmlNode *root)
 {
-    const xmlNode *root = xmlDocGetRootElement(ld->doc);
     const xmlNode *visual;
-    mat4 axes;
-    if (!check_libraries(ld, root) || !read_asset(ld, root, &axes) ||
-        !find_visual_scene(ld, root, &visual) ||
-        !element_only_children(ld, visual, "asset node extra"))
+    const struct frame world = {.unit = 1};
+    struct place top = {.depth = 0};
+    if (!check_libraries(ld, root) || !find_visual_scene(ld, root, &visual) ||
+        !element_only_children(ld, visual, "asset node extra") ||
+        !enter(ld, visual, &world, &top.frame, &top.to_world))
         return false;
-    mat4 unit = mat4_scale(d3(ld->unit, ld->unit, ld->unit));
-    struct place top = {NULL, NULL, mat4_mul(&axes, &unit), 0};
+    /* Other documents than those of Y_UP are turned, too, as the assignment turns them. */
+    if (top.frame.up != 0)
+        for (int j = 0; j < 3; j++) {
+            top.to_world.m[0][j] = -top.to_world.m[0][j];
+            top.to_world.m[2][j] = -top.to_world.m[2][j];
+        }
     for (const xmlNode *c = element_first_child(visual); c != NULL; c = element_next_sibling(c))
         if (element_is(c, "node") && !walk(ld, c, &top))
             return false;
@@ -328,22 +412,43 @@ static bool read_scene(struct loader *ld)
     return true;
 }
 
+/* Gives the scene the paths of all documents but its own. */
+static bool name_documents(struct loader *ld)
+{
+    struct scene *s = &ld->scene;
+    s->documents = malloc(ld->num_documents * sizeof *s->documents);
+    if (s->documents == NULL)
+        return fail_memory(ld);
+    for (size_t i = 1; i < ld->num_documents; i++) {
+        s->documents[s->num_documents++] = ld->documents[i]->path;
+        ld->documents[i]->path = NULL;
+    }
+    return true;
+}
+
 static bool load(struct text_input *in, const char *path, enum dialect dialect, struct scene *out,
                  struct err *e)
 {
-    struct loader ld = {.path = path, .err = e, .dialect = dialect, .unit = 1};
-    bool ok = xml_open(&ld, in) && read_scene(&ld);
+    struct loader ld = {.path = path, .err = e, .dialect = dialect};
+    struct document *d;
+    bool ok = xml_open(&ld, path, in, &d) && read_scene(&ld, xmlDocGetRootElement(d->doc)) &&
+              name_documents(&ld);
     if (ok)
         *out = ld.scene;
     else
         scene_free(&ld.scene);
     for (size_t i = 0; i < ld.num_meshes; i++)
         mesh_release(&ld.meshes[i]);
+    for (size_t i = 0; i < ld.num_documents; i++) {
+        xmlFreeDoc(ld.documents[i]->doc);
+        free(ld.documents[i]->ids);
+        free(ld.documents[i]->path);
+        free(ld.documents[i]);
+    }
+    free(ld.documents);
     free(ld.meshes);
     free(ld.slots);
     free(ld.is_lamp);
-    free(ld.ids);
-    xmlFreeDoc(ld.doc);
     return ok;
 }
 

@@ -1,4 +1,4 @@
-/* Reading elements: names, attributes, references, extras; and the error lines. */
+/* Reading elements: names, attributes, extras; and the error lines. */
 #include "collada_internal.h"
 
 #include <stdarg.h>
@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-bool(fail_line)(struct loader *ld, long line, const char *fmt, ...)
+bool(fail_line)(struct loader *ld, const xmlNode *n, long line, const char *fmt, ...)
 {
     char text[900];
     va_list ap;
@@ -16,7 +16,8 @@ bool(fail_line)(struct loader *ld, long line, const char *fmt, ...)
     for (char *c = text; *c != '\0'; c++)
         if ((unsigned char)*c < 0x20 || *c == 0x7f)
             *c = '?';
-    return err_set(ld->err, "%s:%ld: %s", ld->path, line, text);
+    return err_set(ld->err, "%s:%ld: %s", n != NULL ? element_document(n)->path : ld->path, line,
+                   text);
 }
 
 bool(fail_at)(struct loader *ld, const xmlNode *n, const char *fmt, ...)
@@ -26,7 +27,7 @@ bool(fail_at)(struct loader *ld, const xmlNode *n, const char *fmt, ...)
     va_start(ap, fmt);
     vsnprintf(text, sizeof text, fmt, ap);
     va_end(ap);
-    return fail_line(ld, element_line(n), "%s", text);
+    return fail_line(ld, n, element_line(n), "%s", text);
 }
 
 bool(fail_memory)(struct loader *ld)
@@ -44,6 +45,11 @@ bool element_fail_unexpected(struct loader *ld, const xmlNode *child)
 long element_line(const xmlNode *n)
 {
     return (long)(intptr_t)n->_private;
+}
+
+const struct document *element_document(const xmlNode *n)
+{
+    return n->doc->_private;
 }
 
 static bool same_namespace(const xmlNs *a, const xmlNs *b)
@@ -69,16 +75,21 @@ bool element_is(const xmlNode *n, const char *name)
            same_namespace(n->ns, xmlDocGetRootElement(n->doc)->ns);
 }
 
-bool element_is_one_of(const xmlNode *n, const char *words)
+bool element_word_is_one_of(const char *word, const char *words)
 {
-    while (*words != '\0') {
+    for (; *words != '\0'; words += strspn(words, " ")) {
         size_t length = strcspn(words, " ");
-        if (strlen((const char *)n->name) == length && memcmp(n->name, words, length) == 0)
-            return same_namespace(n->ns, xmlDocGetRootElement(n->doc)->ns);
+        if (strlen(word) == length && memcmp(word, words, length) == 0)
+            return true;
         words += length;
-        words += strspn(words, " ");
     }
     return false;
+}
+
+bool element_is_one_of(const xmlNode *n, const char *words)
+{
+    return element_word_is_one_of((const char *)n->name, words) &&
+           same_namespace(n->ns, xmlDocGetRootElement(n->doc)->ns);
 }
 
 bool element_only_children(struct loader *ld, const xmlNode *n, const char *words)
@@ -149,37 +160,6 @@ int element_compare_ids(const void *a, const void *b)
 {
     const struct id_entry *x = a, *y = b;
     return strcmp(x->id, y->id);
-}
-
-bool element_by_id(struct loader *ld, const xmlNode *n, const char *id, const char *element,
-                   const xmlNode **out)
-{
-    struct id_entry key = {id, NULL};
-    const struct id_entry *hit =
-        ld->num_ids > 0 ? bsearch(&key, ld->ids, ld->num_ids, sizeof key, element_compare_ids)
-                        : NULL;
-    if (hit == NULL)
-        return fail_at(ld, n, "no element with id '%.200s'", id);
-    const struct id_entry *end = ld->ids + ld->num_ids;
-    if ((hit > ld->ids && element_compare_ids(hit - 1, hit) == 0) ||
-        (hit + 1 < end && element_compare_ids(hit + 1, hit) == 0))
-        return fail_at(ld, n, "more than one element has id '%.200s'", id);
-    if (!element_is(hit->node, element))
-        return fail_at(ld, n, "'%.200s' is a <%.60s>, not a <%s>", id,
-                       (const char *)hit->node->name, element);
-    *out = hit->node;
-    return true;
-}
-
-bool element_follow(struct loader *ld, const xmlNode *n, const char *name, const char *element,
-                    const xmlNode **out)
-{
-    const char *url = element_attribute(n, name);
-    if (url == NULL)
-        return fail_at(ld, n, "<%.60s> without attribute '%s'", (const char *)n->name, name);
-    if (url[0] != '#')
-        return fail_at(ld, n, "reference '%.200s' leads out of the file: not supported", url);
-    return element_by_id(ld, n, url + 1, element, out);
 }
 
 bool element_is_own_profile(const char *profile)

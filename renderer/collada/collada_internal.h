@@ -75,21 +75,37 @@ struct material_slot {
 };
 
 /* What is in a file and not in a still image of surfaces: counted for the note. */
-enum left_out { LEFT_OUT_MOVING, LEFT_OUT_LINES, NUM_LEFT_OUT };
+enum left_out {
+    LEFT_OUT_MOVING,
+    LEFT_OUT_LINES,
+    LEFT_OUT_TRANSPARENT,
+    LEFT_OUT_MATERIAL,
+    NUM_LEFT_OUT
+};
+#define NO_SURFACE UINT32_MAX /* a material that lets everything through */
+
+/* A file that is read: the scene's own first, then those that it refers to. */
+struct document {
+    char *path;
+    bool is_file;         /* so that others can be beside it */
+    xmlDoc *doc;          /* whose _private is this */
+    struct id_entry *ids; /* sorted by id */
+    size_t num_ids;
+};
 
 struct loader {
-    const char *path;
+    const char *path; /* of the scene */
     struct err *err;
     bool parse_failed;
     enum dialect dialect;
     bool is_course_export; /* taken for a file of the assignment by the program that wrote it */
     unsigned num_specular; /* materials in use whose highlight the dialect leaves out */
     unsigned num_left_out[NUM_LEFT_OUT];
+    bool is_transparent;            /* the material that is being read */
     const xmlNode *instance_effect; /* of the material that is being read */
-    xmlDoc *doc;
-    struct id_entry *ids; /* sorted by id */
-    size_t num_ids;
-    double unit; /* metres per length unit of the file */
+    struct document **documents;
+    size_t num_documents, cap_documents;
+    double unit; /* metres per length unit of the light or camera that is being read */
     struct mesh *meshes;
     size_t num_meshes, cap_meshes;
     struct material_slot *slots;
@@ -98,7 +114,7 @@ struct loader {
     const char *texcoord; /* of the material that is being read */
     bool *is_lamp;        /* per object: it came from a light element */
     size_t num_nodes;
-    unsigned num_cameras;
+    size_t cap_cameras;
     rgb ambient;        /* of all ambient lights */
     struct scene scene; /* under construction; num_* are also the array sizes in use */
     size_t cap_triangles, cap_spheres, cap_materials, cap_lights, cap_objects, cap_images,
@@ -114,17 +130,18 @@ struct text_input {
     size_t size, taken;
     bool failed; /* the error is set */
 };
-/* Parses the text into ld->doc, refuses document types, foreign structure and other versions,
+/* Parses the text into a new document, refuses document types, foreign structure and other versions,
  * indexes the ids and resolves DIALECT_AUTO. */
-bool xml_open(struct loader *ld, struct text_input *in);
+bool xml_open(struct loader *ld, const char *path, struct text_input *in, struct document **out);
 
 /* collada_element.c */
 
 /* Sets the line "path:line: ..."; control characters become '?'. Always false. */
 bool fail_at(struct loader *ld, const xmlNode *n, const char *fmt, ...)
     __attribute__((format(printf, 3, 4)));
-bool fail_line(struct loader *ld, long line, const char *fmt, ...)
-    __attribute__((format(printf, 3, 4)));
+/* n: of the document that is meant; NULL: ld->path. */
+bool fail_line(struct loader *ld, const xmlNode *n, long line, const char *fmt, ...)
+    __attribute__((format(printf, 4, 5)));
 bool fail_memory(struct loader *ld);
 #ifdef __clang_analyzer__ /* as in err.h */
 #define fail_at(...)    ((void)fail_at(__VA_ARGS__), false)
@@ -134,6 +151,7 @@ bool fail_memory(struct loader *ld);
 /* "unexpected <child> in <parent>". */
 bool element_fail_unexpected(struct loader *ld, const xmlNode *child);
 long element_line(const xmlNode *n);
+const struct document *element_document(const xmlNode *n);
 
 /* Child elements in document order; NULL at the end. */
 xmlNode *element_first_child(const xmlNode *n);
@@ -144,6 +162,7 @@ xmlNode *element_child_named(const xmlNode *n, const char *name);
 bool element_one_child(struct loader *ld, const xmlNode *n, const char *name, xmlNode **out);
 /* Is it the COLLADA element of that name? */
 bool element_is(const xmlNode *n, const char *name);
+bool element_word_is_one_of(const char *word, const char *words);
 /* Is its name one of the words, separated by blanks? */
 bool element_is_one_of(const xmlNode *n, const char *words);
 /* Fails if a child's name is not one of the words. */
@@ -155,12 +174,6 @@ bool element_attribute_count(struct loader *ld, const xmlNode *n, const char *na
 /* The same with a default. */
 bool element_attribute_count_or(struct loader *ld, const xmlNode *n, const char *name,
                                 uint64_t missing, uint64_t *out);
-/* The element of that id; it must be called `element`. `n` is who to blame. */
-bool element_by_id(struct loader *ld, const xmlNode *n, const char *id, const char *element,
-                   const xmlNode **out);
-/* The element that attribute `name` ("#id") points to; it must be called `element`. */
-bool element_follow(struct loader *ld, const xmlNode *n, const char *name, const char *element,
-                    const xmlNode **out);
 /* Orders ids by name, for qsort() and bsearch(). */
 int element_compare_ids(const void *a, const void *b);
 /* Is it "ASSAY" or "CGL"? */
@@ -184,6 +197,10 @@ bool text_read_color(struct loader *ld, const xmlNode *n, rgb *out, double *alph
 /* The element's text without blanks around it; the caller frees. NULL: failed. */
 char *text_read_word(struct loader *ld, const xmlNode *n);
 
+/* Writes every %xx of a URI out, in place. What is no escape stays: many programs write names as they
+ * are. */
+void text_decode_percents(char *s);
+
 /* collada_field.c */
 
 /* A child element that a reader knows. `out` stays as it is where the element is missing. */
@@ -202,6 +219,16 @@ struct field {
 #define FIELD_OF_COLOR(name, out, most) name, FIELD_COLOR, out, true, .hi = (most)
 /* Reads all children of n, which are those fields in any order, each once at most. */
 bool field_read_all(struct loader *ld, const xmlNode *n, const struct field *fields, size_t count);
+
+/* collada_reference.c */
+
+/* The element of that id in the document of n, who is to blame; it must be called `element`. */
+bool reference_find(struct loader *ld, const xmlNode *n, const char *id, const char *element,
+                    const xmlNode **out);
+/* The element that attribute `name` points to, by "#id" or "file.dae#id", which is read from beside
+ * the document; it must be called `element`. */
+bool reference_follow(struct loader *ld, const xmlNode *n, const char *name, const char *element,
+                      const xmlNode **out);
 
 /* collada_parameter.c */
 
@@ -299,8 +326,8 @@ void mesh_release(struct mesh *m);
 
 /* collada_material.c */
 
-/* The material bound to `symbol` (NULL: the only one) by an <instance_geometry>; which of the group's
- * sets of texture coordinates it means, if it has textures. group NULL: a sphere. */
+/* The material bound to `symbol` (NULL: the only one) by an <instance_geometry>, or NO_SURFACE; which
+ * of the group's sets of texture coordinates it means, if it has textures. group NULL: a sphere. */
 bool material_get(struct loader *ld, const xmlNode *instance, const xmlNode *user,
                   const char *symbol, const struct mesh_group *group, uint32_t *index,
                   size_t *uv_set);
@@ -311,7 +338,7 @@ bool light_instance(struct loader *ld, const xmlNode *instance, const xmlNode *l
 /* What all ambient lights give together becomes the environment. */
 bool light_finish(struct loader *ld);
 bool camera_instance(struct loader *ld, const xmlNode *instance, const xmlNode *camera,
-                     const mat4 *m);
+                     const char *node_name, const mat4 *m);
 /* What the assignment uses for a file without a camera. */
 void camera_default(struct loader *ld);
 

@@ -16,10 +16,10 @@ static vec3 to_float(dvec3 v)
 
 /* The attenuation of the light as the file has it. */
 #define ATTENUATION(a)                                                                             \
-    {"constant_attenuation", FIELD_NUMBER, &(a)[0], .hi = 1e300},                                \
-        {"linear_attenuation", FIELD_NUMBER, &(a)[1], .hi = 1e300},                              \
+    {"constant_attenuation", FIELD_NUMBER, &(a)[0], .hi = 1e300},                                  \
+        {"linear_attenuation", FIELD_NUMBER, &(a)[1], .hi = 1e300},                                \
     {                                                                                              \
-        "quadratic_attenuation", FIELD_NUMBER, &(a)[2], .hi = 1e300                              \
+        "quadratic_attenuation", FIELD_NUMBER, &(a)[2], .hi = 1e300                                \
     }
 
 /* To attenuation over metres. Pure inverse-square falloff is brought to the physical form {0, 0, 1},
@@ -210,6 +210,24 @@ static bool set_clipping(struct loader *ld, const xmlNode *n, double near, doubl
     return true;
 }
 
+static bool read_orthographic(struct loader *ld, const xmlNode *n, struct scene_camera *c)
+{
+    double near, far, aspect = 0, x = 0, y = 0;
+    if (!field_read_all(ld, n,
+                        FIELDS({LENGTH("xmag", &x, false)}, {LENGTH("ymag", &y, false)},
+                               {"aspect_ratio", FIELD_NUMBER, &aspect, .lo = 1e-6, .hi = 1e6},
+                               {LENGTH("znear", &near, true)}, {LENGTH("zfar", &far, true)})))
+        return false;
+    if (x == 0 && y == 0)
+        return fail_at(ld, n, "<orthographic> needs <xmag> or <ymag>");
+    if (fmax(x, y) * ld->unit > FARTHEST)
+        return fail_at(ld, n, "<xmag> or <ymag> is out of range");
+    c->xmag = (float)(x * ld->unit);
+    c->ymag = (float)(y * ld->unit);
+    c->aspect = (float)aspect;
+    return set_clipping(ld, n, near, far, c);
+}
+
 static bool read_perspective(struct loader *ld, const xmlNode *n, struct scene_camera *c)
 {
     double near, far, aspect = 0, x = 0, y = 0;
@@ -276,12 +294,11 @@ static bool place(struct loader *ld, const xmlNode *n, const mat4 *m, struct sce
 }
 
 bool camera_instance(struct loader *ld, const xmlNode *instance, const xmlNode *camera,
-                     const mat4 *m)
+                     const char *node_name, const mat4 *m)
 {
     xmlNode *optics, *common = NULL, *kind = NULL;
+    struct scene *s = &ld->scene;
     struct scene_camera c = {.present = true};
-    if (ld->num_cameras++ > 0 && ld->dialect == DIALECT_COLLADA)
-        return fail_at(ld, instance, "a second camera");
     if (!element_only_children(ld, instance, "extra") ||
         !element_only_children(ld, camera, "asset optics imager extra") ||
         !element_one_child(ld, camera, "optics", &optics))
@@ -295,13 +312,21 @@ bool camera_instance(struct loader *ld, const xmlNode *instance, const xmlNode *
         return fail_at(ld, camera, "<camera> without <optics> of a kind");
     if (element_next_sibling(kind) != NULL)
         return element_fail_unexpected(ld, element_next_sibling(kind));
-    if (element_is(kind, "orthographic"))
-        return fail_at(ld, kind, "orthographic cameras are not supported");
-    if (!element_is(kind, "perspective"))
+    bool flat = element_is(kind, "orthographic") && ld->dialect == DIALECT_COLLADA;
+    if (!flat && !element_is(kind, "perspective"))
         return element_fail_unexpected(ld, kind);
-    if (!read_perspective(ld, kind, &c) || !place(ld, instance, m, &c))
+    if (!(flat ? read_orthographic(ld, kind, &c) : read_perspective(ld, kind, &c)) ||
+        !place(ld, instance, m, &c))
         return false;
-    ld->scene.camera = c;
+    build_copy_name(c.name, sizeof c.name, node_name);
+    struct scene_camera *grown =
+        build_grow(ld, s->cameras, sizeof *grown, s->num_cameras, &ld->cap_cameras);
+    if (grown == NULL)
+        return false;
+    s->cameras = grown;
+    if (s->num_cameras == 0 || ld->dialect == DIALECT_CGL)
+        s->camera = c;
+    grown[s->num_cameras++] = c;
     return true;
 }
 

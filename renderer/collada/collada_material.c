@@ -64,8 +64,8 @@ static bool read_factor(struct loader *ld, const xmlNode *shader, const char *na
            (number == NULL || text_read_exactly(ld, number, value, 1));
 }
 
-/* COLLADA 1.5 "Determining Transparency (Opacity)". */
-static bool check_opaque(struct loader *ld, const xmlNode *shader)
+/* COLLADA 1.5 "Determining Transparency (Opacity)": all of the light passes, or none. */
+static bool read_opacity(struct loader *ld, const xmlNode *shader)
 {
     xmlNode *transparent;
     rgb color = grey(1);
@@ -75,18 +75,15 @@ static bool check_opaque(struct loader *ld, const xmlNode *shader)
         !read_factor(ld, shader, "transparency", &factor))
         return false;
     const char *mode = transparent != NULL ? element_attribute(transparent, "opaque") : NULL;
-    bool opaque;
-    if (mode == NULL || strcmp(mode, "A_ONE") == 0)
-        opaque = alpha * factor == 1;
-    else if (strcmp(mode, "A_ZERO") == 0)
-        opaque = alpha * factor == 0;
-    else if (strcmp(mode, "RGB_ZERO") == 0)
-        opaque = rgb_is_zero(color) || factor == 0;
-    else if (strcmp(mode, "RGB_ONE") == 0)
-        opaque = color.r * factor == 1 && color.g * factor == 1 && color.b * factor == 1;
-    else
+    mode = mode != NULL ? mode : "A_ONE";
+    bool by_alpha = mode[0] == 'A';
+    if (!element_word_is_one_of(mode, "A_ONE A_ZERO RGB_ONE RGB_ZERO"))
         return fail_at(ld, transparent, "unknown opaque=\"%.60s\"", mode);
-    if (opaque)
+    double most = (by_alpha ? alpha : (double)rgb_max(color)) * factor,
+           least = (by_alpha ? alpha : (double)fminf(fminf(color.r, color.g), color.b)) * factor,
+           opaque = strstr(mode, "_ONE") != NULL;
+    ld->is_transparent = most == 1 - opaque && least == most;
+    if (ld->is_transparent || (most == opaque && least == most))
         return true;
     return fail_at(ld,
                    transparent != NULL ? transparent : element_child_named(shader, "transparency"),
@@ -98,6 +95,8 @@ static bool check_only_diffuse(struct loader *ld, const xmlNode *shader)
 {
     rgb specular = grey(0), reflective = grey(0);
     double reflectivity = 1;
+    if (!read_opacity(ld, shader) || ld->is_transparent)
+        return ld->is_transparent;
     if (!read_channel(ld, shader, "specular", &specular, NULL) ||
         !read_channel(ld, shader, "reflective", &reflective, NULL) ||
         !read_factor(ld, shader, "reflectivity", &reflectivity))
@@ -108,7 +107,7 @@ static bool check_only_diffuse(struct loader *ld, const xmlNode *shader)
     if (!rgb_is_zero(reflective) && reflectivity != 0)
         return fail_at(ld, element_child_named(shader, "reflective"),
                        "mirror reflection is not supported (--dialect cgl ignores it)");
-    return check_opaque(ld, shader);
+    return true;
 }
 
 /* What the assignment does not look at may be anything; only for the note. */
@@ -188,6 +187,8 @@ static bool read_effect(struct loader *ld, const xmlNode *effect, struct materia
         return fail_at(ld, effect, "<effect> without <profile_COMMON>");
     if (common != NULL && !read_common(ld, common, m))
         return false;
+    if (technique != NULL && ld->is_transparent)
+        return fail_at(ld, technique, "a technique of ours for a surface that is transparent");
     if (technique == NULL)
         return true;
     if (!extra_read_material(ld, technique, m))
@@ -207,15 +208,16 @@ static bool read_material(struct loader *ld, const xmlNode *material, struct mat
     if (instance == NULL)
         return fail_at(ld, material, "<material> without <instance_effect>");
     if (!element_only_children(ld, instance, "technique_hint setparam extra") ||
-        !element_follow(ld, instance, "url", "effect", &effect))
+        !reference_follow(ld, instance, "url", "effect", &effect))
         return false;
     const char *name = element_attribute(material, "name"), *id = element_attribute(material, "id");
     ld->instance_effect = instance;
+    ld->is_transparent = false;
     build_copy_name(m->name, sizeof m->name, name != NULL ? name : id != NULL ? id : "material");
     return read_effect(ld, effect, m);
 }
 
-/* material NULL: what the assignment takes for a surface without material. */
+/* material NULL: what the assignment, or else Blender, takes for a surface without material. */
 static bool slot_get(struct loader *ld, const xmlNode *material, uint32_t *index,
                      const char **texcoord)
 {
@@ -227,7 +229,11 @@ static bool slot_get(struct loader *ld, const xmlNode *material, uint32_t *index
         }
     }
     ld->texcoord = NULL;
-    struct material m = {.name = "default", .kind = MATERIAL_DIFFUSE, .reflectance = grey(0.5f)};
+    struct material m = {
+        .name = "default",
+        .kind = MATERIAL_DIFFUSE,
+        .reflectance = grey(ld->dialect == DIALECT_CGL ? 0.5f : 0.8f),
+    };
     if (material != NULL && !read_material(ld, material, &m))
         return false;
     struct material_slot *grown =
@@ -235,7 +241,9 @@ static bool slot_get(struct loader *ld, const xmlNode *material, uint32_t *index
     if (grown == NULL)
         return false;
     ld->slots = grown;
-    if (!build_add_material(ld, &m, index))
+    if (material != NULL && ld->is_transparent)
+        *index = NO_SURFACE;
+    else if (!build_add_material(ld, &m, index))
         return false;
     *texcoord = ld->texcoord;
     ld->slots[ld->num_slots++] = (struct material_slot){material, *index, *texcoord};
@@ -282,14 +290,16 @@ bool material_get(struct loader *ld, const xmlNode *instance, const xmlNode *use
     }
     if (match == NULL && ld->dialect == DIALECT_CGL)
         match = first;
-    if (match == NULL && ld->dialect == DIALECT_COLLADA)
-        return symbol != NULL
-                   ? fail_at(ld, instance, "no material bound to symbol '%.60s' of line %ld",
-                             symbol, element_line(user))
-                   : fail_at(ld, instance, "no material bound to <%.60s> of line %ld",
-                             (const char *)user->name, element_line(user));
-    return (match == NULL || element_follow(ld, match, "target", "material", &material)) &&
-           slot_get(ld, material, index, &texcoord) &&
-           (!material_has_map(&ld->scene.materials[*index]) ||
-            texture_find_set(ld, instance, match, texcoord, group, uv_set));
+    if (match == NULL && ld->dialect == DIALECT_COLLADA && symbol != NULL && first != NULL)
+        return fail_at(ld, instance, "no material bound to symbol '%.60s' of line %ld", symbol,
+                       element_line(user));
+    if (match == NULL)
+        ld->num_left_out[LEFT_OUT_MATERIAL] += ld->dialect == DIALECT_COLLADA;
+    else if (!reference_follow(ld, match, "target", "material", &material))
+        return false;
+    if (!slot_get(ld, material, index, &texcoord))
+        return false;
+    ld->num_left_out[LEFT_OUT_TRANSPARENT] += *index == NO_SURFACE;
+    return *index == NO_SURFACE || !material_has_map(&ld->scene.materials[*index]) ||
+           texture_find_set(ld, instance, match, texcoord, group, uv_set);
 }

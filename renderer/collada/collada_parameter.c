@@ -62,7 +62,7 @@ static bool follow_surface(struct loader *ld, const xmlNode *sampler, const xmlN
               parameter_get(ld, sampler, surface_name, "surface", &surface) &&
               read_child_word(ld, surface, "init_from", &image_name) &&
               (image_name != NULL || fail_at(ld, surface, "<surface> without <init_from>")) &&
-              element_by_id(ld, surface, image_name, "image", image);
+              reference_find(ld, surface, image_name, "image", image);
     free(surface_name);
     free(image_name);
     return ok;
@@ -77,11 +77,11 @@ bool parameter_get_texture(struct loader *ld, const xmlNode *texture, struct tex
     *out = (struct texture_use){.texcoord = element_attribute(texture, "texcoord")};
     /* Some programs name the image itself, as COLLADA 1.3 did. */
     if (find(ld, texture, name) == NULL)
-        return element_by_id(ld, texture, name, "image", &out->image);
+        return reference_find(ld, texture, name, "image", &out->image);
     if (!parameter_get(ld, texture, name, "sampler2D", &out->sampler) ||
         !element_one_child(ld, out->sampler, "instance_image", &instance))
         return false;
     if (instance == NULL)
         return follow_surface(ld, out->sampler, &out->image);
-    return element_follow(ld, instance, "url", "image", &out->image);
+    return reference_follow(ld, instance, "url", "image", &out->image);
 }

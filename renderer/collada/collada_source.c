@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#define NO_PARAM UINT64_MAX /* of points in a plane, where z is 0 */
+
 void source_release(struct sources *all)
 {
     for (size_t i = 0; i < all->count; i++)
@@ -12,7 +14,8 @@ void source_release(struct sources *all)
     *all = (struct sources){NULL, 0, 0};
 }
 
-/* Positions of the first `width` named <param>s: unnamed ones are not for us to see. */
+/* Positions of the first `width` named <param>s, of three at least two: unnamed ones are not for us to
+ * see. */
 static bool read_params(struct loader *ld, const xmlNode *accessor, uint64_t stride, unsigned width,
                         uint64_t param[3])
 {
@@ -27,9 +30,11 @@ static bool read_params(struct loader *ld, const xmlNode *accessor, uint64_t str
         if (name != NULL && name[0] != '\0' && named < width)
             param[named++] = place;
     }
-    if (named < width)
+    if (named < 2)
         return fail_at(ld, accessor, "<accessor> has %d named <param>s where %u are needed",
                        (int)named, width);
+    if (named < 3)
+        param[2] = NO_PARAM;
     if (stride < place)
         return fail_at(ld, accessor, "<accessor> has more <param>s than its stride");
     return true;
@@ -51,7 +56,7 @@ static bool read_source(struct loader *ld, const xmlNode *node, unsigned width, 
         !element_attribute_count_or(ld, accessor, "stride", 1, &stride) ||
         !element_attribute_count_or(ld, accessor, "offset", 0, &offset) ||
         !read_params(ld, accessor, stride, width, param) ||
-        !element_follow(ld, accessor, "source", "float_array", &array) ||
+        !reference_follow(ld, accessor, "source", "float_array", &array) ||
         !element_attribute_count(ld, array, "count", &declared) ||
         !text_read_doubles(ld, array, &d))
         goto done;
@@ -60,7 +65,8 @@ static bool read_source(struct loader *ld, const xmlNode *node, unsigned width, 
                 (unsigned long long)declared);
         goto done;
     }
-    if (count > 0 && offset + (count - 1) * stride + param[width - 1] >= d.count) {
+    uint64_t last = width < 3 || param[2] == NO_PARAM ? param[1] : param[2];
+    if (count > 0 && offset + (count - 1) * stride + last >= d.count) {
         fail_at(ld, accessor, "<accessor> reaches beyond the end of its <float_array>");
         goto done;
     }
@@ -76,7 +82,8 @@ static bool read_source(struct loader *ld, const xmlNode *node, unsigned width, 
     }
     for (uint64_t i = 0; i < count; i++)
         for (unsigned k = 0; k < width; k++)
-            out->xyz[width * i + k] = d.data[offset + i * stride + param[k]];
+            out->xyz[width * i + k] =
+                param[k] == NO_PARAM ? 0 : d.data[offset + i * stride + param[k]];
     ok = true;
 done:
     free(d.data);
@@ -87,7 +94,7 @@ static bool get_source(struct loader *ld, struct sources *all, const xmlNode *in
                        long *index)
 {
     const xmlNode *node;
-    if (!element_follow(ld, input, "source", "source", &node))
+    if (!reference_follow(ld, input, "source", "source", &node))
         return false;
     for (size_t i = 0; i < all->count; i++) {
         if (all->data[i].node == node && all->data[i].width == width) {
@@ -126,24 +133,13 @@ static bool add_uv(struct loader *ld, struct sources *all, const xmlNode *input,
            get_source(ld, all, input, 2, &uv->source);
 }
 
-/* What hangs on texture coordinates shows nothing of its own. */
-static bool is_texture_semantic(const char *s)
-{
-    static const char *const WORDS[] = {"TANGENT", "BINORMAL", "IMAGE", "TEXTANGENT",
-                                        "TEXBINORMAL"};
-    for (size_t i = 0; i < sizeof WORDS / sizeof *WORDS; i++)
-        if (strcmp(s, WORDS[i]) == 0)
-            return true;
-    return false;
-}
-
-/* Vertex colours do not show in the assignment; elsewhere they would be expected to. */
+/* What hangs on texture coordinates shows nothing of its own, and unknown semantics mean something to
+ * some other program. Vertex colours do not show in the assignment; elsewhere they would be expected
+ * to. */
 static bool skip_input(struct loader *ld, const xmlNode *input, const char *semantic)
 {
-    if (is_texture_semantic(semantic) ||
-        (ld->dialect == DIALECT_CGL && strcmp(semantic, "COLOR") == 0))
-        return true;
-    return fail_at(ld, input, "<input> of semantic '%.60s' is not supported", semantic);
+    return ld->dialect == DIALECT_CGL || strcmp(semantic, "COLOR") != 0 ||
+           fail_at(ld, input, "<input> of semantic 'COLOR' (vertex colours) is not supported");
 }
 
 static bool read_vertices(struct loader *ld, struct sources *all, const xmlNode *vertices,
@@ -206,7 +202,7 @@ bool source_read_inputs(struct loader *ld, struct sources *all, const xmlNode *p
             const xmlNode *vertices;
             if (has_vertex)
                 return fail_at(ld, c, "a second <input> of semantic 'VERTEX'");
-            if (!element_follow(ld, c, "source", "vertices", &vertices) ||
+            if (!reference_follow(ld, c, "source", "vertices", &vertices) ||
                 !read_vertices(ld, all, vertices, in))
                 return false;
             has_vertex = true;

@@ -100,7 +100,7 @@ bool text_read_doubles(struct loader *ld, const xmlNode *n, struct doubles *out)
         out->data = grown;
         const char *end = s;
         if (!number_parse(s, &end, &v))
-            ok = fail_line(ld, line, "<%.60s>: '%.*s' is not a finite number",
+            ok = fail_line(ld, n, line, "<%.60s>: '%.*s' is not a finite number",
                            (const char *)n->name, token_length(s), s);
         else
             out->data[out->count++] = v;
@@ -127,7 +127,7 @@ bool text_read_uints(struct loader *ld, const xmlNode *n, struct uints *out)
         for (; *s >= '0' && *s <= '9' && v <= UINT32_MAX; s++)
             v = 10 * v + (uint64_t)(*s - '0');
         if (s == start || v > UINT32_MAX || (*s != '\0' && !is_space(*s)))
-            ok = fail_line(ld, line, "<%.60s>: '%.*s' is not an index", (const char *)n->name,
+            ok = fail_line(ld, n, line, "<%.60s>: '%.*s' is not an index", (const char *)n->name,
                            token_length(start), start);
         else
             out->data[out->count++] = (uint32_t)v;
@@ -197,4 +197,22 @@ char *text_read_word(struct loader *ld, const xmlNode *n)
     }
     text_free(&t);
     return word;
+}
+
+static int hex_digit(char c)
+{
+    const char *digits = "0123456789abcdef", *at = c != '\0' ? strchr(digits, c | 0x20) : NULL;
+    return at != NULL ? (int)(at - digits) : -1;
+}
+
+void text_decode_percents(char *s)
+{
+    char *to = s;
+    for (; *s != '\0'; s++) {
+        int high = *s == '%' ? hex_digit(s[1]) : -1, low = high >= 0 ? hex_digit(s[2]) : -1;
+        bool escape = low >= 0 && high + low > 0;
+        *to++ = escape ? (char)(16 * high + low) : *s;
+        s += escape ? 2 : 0;
+    }
+    *to = '\0';
 }

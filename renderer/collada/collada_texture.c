@@ -7,36 +7,17 @@
 #include <stdlib.h>
 #include <string.h>
 
-static int hex_digit(char c)
-{
-    const char *digits = "0123456789abcdef", *at = c != '\0' ? strchr(digits, c | 0x20) : NULL;
-    return at != NULL ? (int)(at - digits) : -1;
-}
-
-/* In place. What is no escape stays: many programs write names as they are. */
-static void decode_percents(char *s)
-{
-    char *to = s;
-    for (; *s != '\0'; s++) {
-        int high = *s == '%' ? hex_digit(s[1]) : -1, low = high >= 0 ? hex_digit(s[2]) : -1;
-        bool escape = low >= 0 && high + low > 0;
-        *to++ = escape ? (char)(16 * high + low) : *s;
-        s += escape ? 2 : 0;
-    }
-    *to = '\0';
-}
-
 /* The file that a URI means: relative to the document's directory, or after file://. */
 static bool find_file(struct loader *ld, const xmlNode *n, char *uri, struct path *out)
 {
     char *rest = strstr(uri, "://");
     if (rest != NULL && strncmp(uri, "file://", 7) != 0)
         return fail_at(ld, n, "an image from '%.200s' is not supported", uri);
-    decode_percents(uri);
+    text_decode_percents(uri);
     if (rest != NULL)
         *out = fs_path("%s", rest + 3);
     else
-        *out = uri[0] == '/' ? fs_path("%s", uri) : fs_beside_file(ld->path, uri);
+        *out = uri[0] == '/' ? fs_path("%s", uri) : fs_beside_file(element_document(n)->path, uri);
     return true;
 }
 

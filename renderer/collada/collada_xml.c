@@ -43,7 +43,7 @@ static void complain(struct loader *ld, xml_complaint error)
     char text[512];
     snprintf(text, sizeof text, "%s", error->message != NULL ? error->message : "malformed XML");
     text[strcspn(text, "\n")] = '\0';
-    fail_line(ld, error->line, "not well-formed: %s", text);
+    fail_line(ld, NULL, error->line, "not well-formed: %s", text);
 }
 
 static void parse_error(void *ctx, xml_complaint error)
@@ -70,7 +70,7 @@ static void document_type(void *ctx, const xmlChar *name, const xmlChar *externa
     xmlParserCtxt *ctxt = ctx;
     struct loader *ld = ctxt->_private;
     if (!ld->parse_failed)
-        fail_line(ld, ctxt->input->line, "a document type (DOCTYPE) is not accepted");
+        fail_line(ld, NULL, ctxt->input->line, "a document type (DOCTYPE) is not accepted");
     ld->parse_failed = true;
     xmlStopParser(ctxt);
 }
@@ -101,7 +101,7 @@ static int read_some(void *context, char *buffer, int size)
     return in->failed ? -1 : (int)n;
 }
 
-static bool parse(struct loader *ld, struct text_input *in)
+static bool parse(struct loader *ld, struct document *d, struct text_input *in)
 {
     struct reading reading = {ld, in};
     xmlSetStructuredErrorFunc(ld, library_error); /* of this thread */
@@ -116,8 +116,8 @@ static bool parse(struct loader *ld, struct text_input *in)
     ctxt->sax->serror = parse_error;
     /* HUGE lifts the limit of 10 MB for one text, which large meshes reach; what else it lifts
      * (depth, entities) is checked here. */
-    ld->doc = xmlCtxtReadIO(ctxt, read_some, NULL, &reading, NULL, NULL,
-                            XML_PARSE_NONET | XML_PARSE_HUGE);
+    d->doc = xmlCtxtReadIO(ctxt, read_some, NULL, &reading, NULL, NULL,
+                           XML_PARSE_NONET | XML_PARSE_HUGE);
     if (ctxt->errNo == XML_ERR_NO_MEMORY && !ld->parse_failed)
         ld->parse_failed = !fail_memory(ld);
     bool failed = ld->parse_failed;
@@ -125,8 +125,8 @@ static bool parse(struct loader *ld, struct text_input *in)
     xmlSetStructuredErrorFunc(NULL, NULL);
     if (failed)
         return false;
-    if (ld->doc == NULL || xmlDocGetRootElement(ld->doc) == NULL)
-        return fail_line(ld, 1, "not well-formed: no XML document");
+    if (d->doc == NULL || xmlDocGetRootElement(d->doc) == NULL)
+        return fail_line(ld, NULL, 1, "not well-formed: no XML document");
     return true;
 }
 
@@ -153,6 +153,11 @@ static bool survey_texts(struct loader *ld, const xmlNode *n)
 static bool survey_element(struct loader *ld, xmlNode *n, bool *has_cgl, bool *enter)
 {
     *enter = true;
+    /* Other files may have textures for our meshes. */
+    const char *url = element_attribute(n, "url"), *target = element_attribute(n, "target");
+    if (ld->num_documents == 1)
+        ld->has_textures |= element_is(n, "texture") || (url != NULL && url[0] != '#') ||
+                            (target != NULL && target[0] != '#');
     if (element_is(n, "technique")) {
         const char *profile = element_attribute(n, "profile");
         const xmlNode *owner = n->parent->parent;
@@ -171,42 +176,36 @@ static bool survey_element(struct loader *ld, xmlNode *n, bool *has_cgl, bool *e
             *has_cgl = true;
         }
         *enter = profile == NULL || element_is_own_profile(profile);
-    } else if (element_is(n, "texture")) {
-        ld->has_textures = true;
     } else if (strncmp((const char *)n->name, "profile_", 8) == 0 &&
                !element_is(n, "profile_COMMON")) {
         *enter = false;
-    } else if (element_is(n, "asset") && n->parent != xmlDocGetRootElement(ld->doc) &&
-               (element_child_named(n, "unit") != NULL ||
-                element_child_named(n, "up_axis") != NULL)) {
-        return fail_at(ld, n, "<unit> and <up_axis> are read for the whole document only");
     }
     return !*enter || survey_texts(ld, n);
 }
 
-static bool add_id(struct loader *ld, xmlNode *n, size_t *capacity)
+static bool add_id(struct loader *ld, struct document *d, xmlNode *n, size_t *capacity)
 {
     const char *id = element_attribute(n, "id");
     if (id == NULL)
         return true;
-    struct id_entry *grown = build_grow(ld, ld->ids, sizeof *grown, ld->num_ids, capacity);
+    struct id_entry *grown = build_grow(ld, d->ids, sizeof *grown, d->num_ids, capacity);
     if (grown == NULL)
         return false;
-    ld->ids = grown;
-    ld->ids[ld->num_ids++] = (struct id_entry){id, n};
+    d->ids = grown;
+    d->ids[d->num_ids++] = (struct id_entry){id, n};
     return true;
 }
 
-static bool survey(struct loader *ld, bool *has_cgl)
+static bool survey(struct loader *ld, struct document *d, bool *has_cgl)
 {
-    xmlNode *root = xmlDocGetRootElement(ld->doc), *n = root;
+    xmlNode *root = xmlDocGetRootElement(d->doc), *n = root;
     size_t capacity = 0;
     int depth = 0;
     while (n != NULL) {
         bool enter;
         if (depth > MAX_XML_DEPTH)
             return fail_at(ld, n, "elements nested deeper than %d", MAX_XML_DEPTH);
-        if (!survey_element(ld, n, has_cgl, &enter) || !add_id(ld, n, &capacity))
+        if (!survey_element(ld, n, has_cgl, &enter) || !add_id(ld, d, n, &capacity))
             return false;
         xmlNode *next = enter ? element_first_child(n) : NULL;
         if (next != NULL)
@@ -220,14 +219,13 @@ static bool survey(struct loader *ld, bool *has_cgl)
         }
         n = next;
     }
-    if (ld->num_ids > 0)
-        qsort(ld->ids, ld->num_ids, sizeof *ld->ids, element_compare_ids);
+    if (d->num_ids > 0)
+        qsort(d->ids, d->num_ids, sizeof *d->ids, element_compare_ids);
     return true;
 }
 
-static bool check_root(struct loader *ld)
+static bool check_root(struct loader *ld, const xmlNode *root)
 {
-    const xmlNode *root = xmlDocGetRootElement(ld->doc);
     static const char *const NAMESPACES[] = {"http://www.collada.org/2005/11/COLLADASchema",
                                              "http://www.collada.org/2008/03/COLLADASchema"};
     if (strcmp((const char *)root->name, "COLLADA") != 0)
@@ -245,10 +243,10 @@ static bool check_root(struct loader *ld)
 
 /* The course's scenes without CGL extras (meshedit, keenan, simple) are as Blender 2.72 and 2.74 wrote them, which no other
  * program of these days does. */
-static bool is_course_export(const struct loader *ld)
+static bool is_course_export(const xmlNode *root)
 {
     static const char *const TOOLS[] = {"Blender 2.72", "Blender 2.74"};
-    const xmlNode *asset = element_child_named(xmlDocGetRootElement(ld->doc), "asset"),
+    const xmlNode *asset = element_child_named(root, "asset"),
                   *by = asset != NULL ? element_child_named(asset, "contributor") : NULL,
                   *tool = by != NULL ? element_child_named(by, "authoring_tool") : NULL;
     const xmlNode *text = tool != NULL ? tool->children : NULL;
@@ -258,13 +256,34 @@ static bool is_course_export(const struct loader *ld)
     return false;
 }
 
-bool xml_open(struct loader *ld, struct text_input *in)
+bool xml_open(struct loader *ld, const char *path, struct text_input *in, struct document **out)
 {
+    const char *main_path = ld->path;
     bool has_cgl = false;
-    if (!parse(ld, in) || !check_root(ld) || !survey(ld, &has_cgl))
+    struct document *d = calloc(1, sizeof *d), **grown = NULL;
+    if (d != NULL)
+        grown =
+            build_grow(ld, ld->documents, sizeof(void *), ld->num_documents, &ld->cap_documents);
+    if (grown == NULL) {
+        free(d);
+        return fail_memory(ld);
+    }
+    ld->documents = grown;
+    ld->documents[ld->num_documents++] = *out = d;
+    d->path = strdup(path);
+    if (d->path == NULL)
+        return fail_memory(ld);
+    d->is_file = in->file != NULL;
+    ld->path = d->path;
+    if (!parse(ld, d, in))
+        return false;
+    ld->path = main_path;
+    d->doc->_private = d;
+    const xmlNode *root = xmlDocGetRootElement(d->doc);
+    if (!check_root(ld, root) || !survey(ld, d, &has_cgl))
         return false;
     if (ld->dialect == DIALECT_AUTO) {
-        ld->is_course_export = !has_cgl && is_course_export(ld);
+        ld->is_course_export = !has_cgl && is_course_export(root);
         ld->dialect = has_cgl || ld->is_course_export ? DIALECT_CGL : DIALECT_COLLADA;
     }
     return true;

@@ -176,7 +176,11 @@ static const struct cli_option options[] = {
     {'r', "resolution", "W H", "pixels, also as WxH (800 600)", TO(width), 1, 65535},
     {'p', "cell", "X Y DX DY", "render only this cell, origin at the bottom left",
      .read = read_cell},
-    {'c', "camera", "FILE", "camera settings as the assignment's GUI writes them", TO(camera_file)},
+    {'c', "camera", "NAME",
+     "the scene's camera of that name, or a file of camera settings\n"
+     "as the assignment's GUI writes them (the first camera)",
+     TO(camera_file)},
+    {0, "list-cameras", "", "print the scene's cameras", TO(action), ACTION_CAMERAS},
     {0, "seed", "N", "64-bit seed of all samples (1)", TO(seed)},
     {0, "sampler", "NAME", "independent or sobol: less noise, but unknown error (independent)",
      TO(sampler), .names = sampler_kind_names},
@@ -215,6 +219,12 @@ static bool complete(struct options *s, struct err *e)
         s->first_bounce = s->max_bounces;
     if (s->scene == NULL)
         return err_set(e, "no scene given (see --help)");
+    if (s->action == ACTION_CAMERAS)
+        return true;
+    if (s->camera_file != NULL && access(s->camera_file, F_OK) != 0) {
+        s->camera_name = s->camera_file;
+        s->camera_file = NULL;
+    }
     if (s->num_outputs == 0)
         return err_set(e, "no output given: -f FILE.exr or FILE.png");
     if (s->first_bounce > s->max_bounces)
@@ -276,7 +286,8 @@ bool options_parse(int argc, char **argv, struct options *s, struct err *e)
                           .pilot_tolerance = -1,
                           .lens_radius = -1,
                           .focal_distance = -1};
-    return cli_read(options, argc, argv, s, e) && (s->action != ACTION_RENDER || complete(s, e));
+    return cli_read(options, argc, argv, s, e) &&
+           ((s->action != ACTION_RENDER && s->action != ACTION_CAMERAS) || complete(s, e));
 }
 
 static void print_names(const char *what, const char *const *names)
@@ -290,7 +301,8 @@ static void print_names(const char *what, const char *const *names)
 void options_print(const struct options *o)
 {
     switch (o->action) {
-    case ACTION_RENDER: break;
+    case ACTION_RENDER:
+    case ACTION_CAMERAS: break;
     case ACTION_HELP:
         cli_print_help("usage: pathtracer [options] -f OUT.exr SCENE.dae\n\n"
                        "Renders a COLLADA scene by path tracing. Every option with its default:\n",

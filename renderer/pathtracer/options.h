@@ -11,6 +11,7 @@ enum { FRAME_CROP, FRAME_WHOLE };        /* options.frame */
 
 struct options {
     const char *scene, *camera_file, *environment_file;
+    const char *camera_name;         /* in the scene; not together with a file */
     const char *output[MAX_OUTPUTS]; /* each ends in .exr or .png */
     int num_outputs;
     const char *heatmap; /* PNG file; NULL: none */
@@ -34,17 +35,17 @@ struct options {
     double lens_radius, focal_distance;         /* negative: not given */
     double max_seconds, max_error, write_every; /* 0: off */
     int slurm;                                  /* jobs on a cluster; 0: render here */
-    enum { ACTION_RENDER, ACTION_HELP, ACTION_VERSION, ACTION_LIST } action;
+    enum { ACTION_RENDER, ACTION_CAMERAS, ACTION_HELP, ACTION_VERSION, ACTION_LIST } action;
 };
 
 /* cli_apart() of a command that options_parse() took. */
 char **options_apart(int argc, char **argv) __attribute__((warn_unused_result));
 /* Fills *o from the command line, with defaults where it is silent. An action other than
- * ACTION_RENDER leaves the rest unchecked. */
+ * ACTION_RENDER leaves the rest unchecked, but for the scene of ACTION_CAMERAS. */
 bool options_parse(int argc, char **argv, struct options *o, struct err *e)
     __attribute__((warn_unused_result));
 
-/* What --help, --version and --list say, on stdout. */
+/* What --help, --version and --list say, on stdout; nothing of the other actions. */
 void options_print(const struct options *o);
 
 /* Does a file name end in .exr (else it ends in .png)? */

@@ -73,8 +73,29 @@ static bool setup_camera(const struct options *o, const struct scene *scene, str
         return false;
     if (o->lens_radius >= 0)
         c->lens_radius = (float)o->lens_radius;
+    if (c->is_orthographic && c->lens_radius > 0)
+        return err_set(e, "%s: a lens needs a perspective camera", o->scene);
     if (o->focal_distance >= 0 || o->camera_file == NULL)
         c->focal_distance = o->focal_distance >= 0 ? (float)o->focal_distance : 4.7f;
+    return true;
+}
+
+static bool print_cameras(const struct options *o, struct err *e)
+{
+    const double degree = 3.14159265358979323846 / 180;
+    struct scene scene = {0};
+    if (!collada_load(o->scene, (enum dialect)o->dialect, &scene, e))
+        return false;
+    for (uint32_t i = 0; i < scene.num_cameras; i++) {
+        const struct scene_camera *c = &scene.cameras[i];
+        if (c->xmag > 0 || c->ymag > 0)
+            printf("%s: orthographic, %g x %g\n", c->name, 2 * (double)c->xmag,
+                   2 * (double)c->ymag);
+        else
+            printf("%s: perspective, %g x %g degrees\n", c->name, (double)c->hfov / degree,
+                   (double)c->vfov / degree);
+    }
+    scene_free(&scene);
     return true;
 }
 
@@ -82,6 +103,11 @@ static bool load_scene(const struct options *o, struct scene *scene, struct err 
 {
     if (!collada_load(o->scene, (enum dialect)o->dialect, scene, e))
         return false;
+    if (o->camera_name != NULL && !scene_choose_camera(scene, o->camera_name))
+        return err_set(e,
+                       "--camera: '%s' is neither a camera of the scene (--list-cameras) nor a "
+                       "file",
+                       o->camera_name);
     if (scene->note[0] != '\0' && !o->quiet)
         fprintf(stderr, "pathtracer: note: %s\n", scene->note);
     if (scene->num_degenerate > 0 && !o->quiet)
@@ -253,7 +279,9 @@ int main(int argc, char **argv)
     if (ok)
         for (s.out.argv = words, s.out.argc = 0; words[s.out.argc] != NULL;)
             s.out.argc++;
-    if (ok && o.action != ACTION_RENDER)
+    if (ok && o.action == ACTION_CAMERAS)
+        ok = print_cameras(&o, &e);
+    else if (ok && o.action != ACTION_RENDER)
         options_print(&o);
     else if (ok && o.slurm > 0)
         ok = hand_over(s.out.argc, words, &e);

@@ -5,14 +5,16 @@
 #include <stdio.h>
 #include <string.h>
 
-/* Of all files that textures are from; "" if there are none. */
-static bool hash_images(const struct scene *s, char hex[65], struct err *e)
+/* Of all files that textures are from and of all that the scene refers to; "" if there are none. */
+static bool hash_files(const struct scene *s, char hex[65], struct err *e)
 {
     char text[2 * 65];
     hex[0] = '\0';
-    for (uint32_t i = 0; i < s->num_images; i++) {
+    for (uint32_t i = 0; i < s->num_images + s->num_documents; i++) {
         char one[65];
-        if (!sha256_file(image_get_attr(&s->images[i], SCENE_IMAGE_FILE), one, e))
+        const char *file = i < s->num_images ? image_get_attr(&s->images[i], SCENE_IMAGE_FILE)
+                                             : s->documents[i - s->num_images];
+        if (!sha256_file(file, one, e))
             return false;
         snprintf(text, sizeof text, "%s%s", hex, one);
         sha256_text(text, hex);
@@ -25,10 +27,12 @@ bool render_id_make(const struct options *o, const struct scene *s, struct rende
 {
     char camera[65] = "none", environment[65] = "none", images[65];
     *id = (struct render_id){.first_sample = (uint32_t)o->first};
+    if (o->camera_name != NULL)
+        snprintf(camera, sizeof camera, "%s", o->camera_name);
     if (!sha256_file(o->scene, id->scene, e) ||
         (o->camera_file != NULL && !sha256_file(o->camera_file, camera, e)) ||
         (o->environment_file != NULL && !sha256_file(o->environment_file, environment, e)) ||
-        !hash_images(s, images, e))
+        !hash_files(s, images, e))
         return false;
     /* The dialect by number: 0 stands for auto, which the scene file decides. */
     snprintf(id->settings, sizeof id->settings,

@@ -15,7 +15,7 @@ struct render_id {
     uint32_t first_sample;
 };
 
-/* Reads scene and camera file and the images of the loaded scene to hash them. */
+/* Reads scene and camera file and what else the loaded scene is from to hash them. */
 bool render_id_make(const struct options *o, const struct scene *s, struct render_id *id,
                     struct err *e) __attribute__((warn_unused_result));
 

@@ -68,6 +68,11 @@ bool camera_init(struct camera *c, const struct scene *s, int width, int height,
         c->tan_v = tanf(f->vfov / 2);
         c->tan_h = c->tan_v / shape;
     }
+    c->is_orthographic = f->xmag > 0 || f->ymag > 0;
+    if (c->is_orthographic) {
+        c->tan_h = f->xmag > 0 ? f->xmag : f->ymag / shape;
+        c->tan_v = c->tan_h * shape;
+    }
     return true;
 }
 
@@ -119,6 +124,7 @@ bool camera_read_file(struct camera *c, const char *path, struct err *e)
         length(sub(cross(axes[0], axes[1]), axes[2])) > 2e-3f)
         return err_set(e, "%s: the camera's matrix is not a rotation", path);
     const double degree = 3.14159265358979323846 / 180;
+    c->is_orthographic = false;
     c->right = normalize(axes[0]);
     c->up = normalize(axes[1]);
     c->backward = normalize(axes[2]);

@@ -1,22 +1,24 @@
-/* From pixels to rays: pinhole or thin lens, box filter of one pixel. */
+/* From pixels to rays: pinhole, thin lens or parallel, box filter of one pixel. */
 #ifndef ASSAY_CAMERA_H
 #define ASSAY_CAMERA_H
 
 #include "scene.h"
 
 /* The camera of one image. Row 0 is the top row. Image-plane point (sx, sy), both in [-1,1] with
- * sy up, lies in direction sx*tan_h*right + sy*tan_v*up - backward. */
+ * sy up, lies in direction sx*tan_h*right + sy*tan_v*up - backward; of an orthographic camera it lies
+ * at eye + sx*tan_h*right + sy*tan_v*up in direction -backward. */
 struct camera {
     vec3 eye, right, up, backward; /* unit, orthogonal */
-    float tan_h, tan_v;            /* tangents of the half angles of view */
-    float near, far;               /* measured along the ray, as the assignment does */
-    int width, height;             /* of the full image, pixels */
-    float lens_radius;             /* 0: pinhole */
-    float focal_distance;          /* of the plane in focus, along the axis */
+    bool is_orthographic;
+    float tan_h, tan_v;   /* tangents of the half angles of view; orthographic: half sizes */
+    float near, far;      /* measured along the ray, as the assignment does */
+    int width, height;    /* of the full image, pixels */
+    float lens_radius;    /* 0: pinhole */
+    float focal_distance; /* of the plane in focus, along the axis */
 };
 
 /* Frames the scene for a width x height image by the scene's dialect: COLLADA keeps the file's
- * pose and horizontal angle (or, if it has only a vertical one, that) with square pixels; CGL
+ * pose and horizontal angle or size (or, if it has only a vertical one, that) with square pixels; CGL
  * re-places the eye on the file's viewing direction at 1.5 bounding-box diagonals, fits the angle
  * at 800x600 and crops to the size asked for (notes in renderer/README.md). Pinhole. Fails if a
  * COLLADA file has no camera. */

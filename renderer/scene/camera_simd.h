@@ -13,6 +13,10 @@ INLINE void camera_rays(const struct camera *c, vf x, vf y, vf u, vf v, vec3v *o
     const vec3v right = v3_all(c->right), up = v3_all(c->up);
     *d = subv(madv(scalev(right, sx), sy, up), v3_all(c->backward));
     *o = v3_all(c->eye);
+    if (c->is_orthographic) {
+        *o = addv(*o, madv(scalev(right, sx), sy, up));
+        *d = v3_all(neg(c->backward));
+    }
     if (c->lens_radius > 0) {
         vf lx, ly;
         warp_disk(u, v, &lx, &ly);

@@ -29,6 +29,10 @@ void scene_free(struct scene *s)
     free(s->images);
     free(s->textures);
     free(s->uv);
+    free(s->cameras);
+    for (uint32_t i = 0; i < s->num_documents; i++)
+        free(s->documents[i]);
+    free(s->documents);
     environment_free(s->environment);
     memset(s, 0, sizeof *s);
 }
@@ -317,6 +321,16 @@ bool scene_finish(struct scene *s, const char *where, struct err *e)
         return false;
     find_bounds(s);
     return true;
+}
+
+bool scene_choose_camera(struct scene *s, const char *name)
+{
+    for (uint32_t i = 0; i < s->num_cameras; i++)
+        if (strcmp(s->cameras[i].name, name) == 0) {
+            s->camera = s->cameras[i];
+            return true;
+        }
+    return false;
 }
 
 bool scene_add_environment(struct scene *s, struct environment *env, struct err *e)

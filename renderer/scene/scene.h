@@ -120,9 +120,12 @@ struct object {
  * even if not present (by the assignment's defaults), backward is the assignment's direction from
  * the scene to the eye, and right and up follow from it and world +Y. */
 struct scene_camera {
+    char name[64]; /* of its node */
     bool present;
     vec3 right, up, backward, eye;
     float hfov, vfov, aspect;
+    float xmag,
+        ymag; /* orthographic: half width and height, and no angles; 0 where the file is silent */
     float near, far;
 };
 
@@ -149,7 +152,11 @@ struct scene {
     struct object *objects;
     struct environment *environment; /* NULL if there is none */
     int32_t environment_light;       /* index into lights, -1 if there is none */
-    struct scene_camera camera;
+    char **documents;                /* paths of the other files that it was read from */
+    uint32_t num_documents;
+    struct scene_camera camera;   /* the one to see by: the first, in the CGL dialect the last */
+    struct scene_camera *cameras; /* all */
+    uint32_t num_cameras;
     vec3 bounds_min, bounds_max; /* of all primitives */
     /* What the assignment's camera is framed on. CGL: the bounds without the rectangles of area
      * lights, with the meshes that gave way to them; else the bounds. */
@@ -182,6 +189,9 @@ static inline bool material_has_map(const struct material *m)
  * `where` starts the line. */
 bool scene_finish(struct scene *s, const char *where, struct err *e)
     __attribute__((warn_unused_result));
+
+/* Sees by the first camera of that name. False if there is none. */
+bool scene_choose_camera(struct scene *s, const char *name) __attribute__((warn_unused_result));
 
 /* Adds an environment, and its light behind all others, to a scene that is complete. The scene owns
  * it from then on; on failure (there is one already; out of memory) the caller still does. */

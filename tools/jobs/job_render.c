@@ -120,7 +120,7 @@ static bool add_job(struct plan *p, const int cell[4], const int *range, struct 
     return plan_job(p, word, range != NULL ? 7 : 5, (const char *const[]){NULL}, e);
 }
 
-/* The images of its textures, and what reads them. */
+/* The images of its textures and what reads them, and the files that it refers to. */
 static bool add_images(struct plan *p, const struct options *o, struct err *e)
 {
     struct scene s;
@@ -130,6 +130,8 @@ static bool add_images(struct plan *p, const struct options *o, struct err *e)
     bool ok = s.num_images == 0 || (image_oiio_file(&module, e) && plan_input(p, module.s, e));
     for (uint32_t i = 0; ok && i < s.num_images; i++)
         ok = plan_input(p, image_get_attr(&s.images[i], SCENE_IMAGE_FILE), e);
+    for (uint32_t i = 0; ok && i < s.num_documents; i++)
+        ok = plan_input(p, s.documents[i], e);
     scene_free(&s);
     return ok;
 }

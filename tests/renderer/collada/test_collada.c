@@ -152,6 +152,10 @@ static char *dump(const struct scene *s)
         "zero_normals %u\nnote %s\ncamera %d\nhfov %.9g\nvfov %.9g\naspect %.9g\nnear %.9g\nfar %.9g\n",
         s->num_zero_normals, s->note, c->present, (double)c->hfov, (double)c->vfov,
         (double)c->aspect, (double)c->near, (double)c->far);
+    fprintf(f, "xmag %.9g\nymag %.9g\ncameras", (double)c->xmag, (double)c->ymag);
+    for (uint32_t i = 0; i < s->num_cameras; i++)
+        fprintf(f, " %s", s->cameras[i].name);
+    fputc('\n', f);
     put(f, "right", c->right);
     put(f, "up", c->up);
     put(f, "backward", c->backward);
@@ -320,15 +324,15 @@ static void run_file(const char *path, int cases)
 
 TEST(geometry)
 {
-    run_file("tests/renderer/collada/geometry.cases", 33);
+    run_file("tests/renderer/collada/geometry.cases", 39);
 }
 TEST(materials)
 {
-    run_file("tests/renderer/collada/look.cases", 45);
+    run_file("tests/renderer/collada/look.cases", 51);
 }
 TEST(lights_and_cameras)
 {
-    run_file("tests/renderer/collada/light.cases", 36);
+    run_file("tests/renderer/collada/light.cases", 38);
 }
 TEST(refused)
 {

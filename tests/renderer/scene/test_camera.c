@@ -152,3 +152,32 @@ TEST(collada_keeps_the_angle_of_the_file)
     s.camera.present = false;
     REFUSES(camera_init(&c, &s, 300, 200, &e), "no camera");
 }
+
+/* Half a width of 3 on 40 x 20 pixels is half a height of 1.5: pixel edge (x, y) lies at (3 (x/20 - 1), 1.5 (1 - y/10), 5), and
+ * all rays go along -Z. Where only a half height of 1.5 is given it is the same. */
+TEST(orthographic_rays_are_parallel)
+{
+    for (int only_height = 0; only_height < 2; only_height++) {
+        struct camera c;
+        struct err e = {""};
+        struct scene s = {.dialect = DIALECT_COLLADA,
+                          .camera = {.present = true,
+                                     .right = {1, 0, 0},
+                                     .up = {0, 1, 0},
+                                     .backward = {0, 0, 1},
+                                     .eye = {0, 0, 5},
+                                     .xmag = only_height ? 0 : 3,
+                                     .ymag = only_height ? 1.5f : 0,
+                                     .near = 0.5f,
+                                     .far = 9}};
+        MUST(camera_init(&c, &s, 40, 20, &e));
+        for (int i = 0; i < 16; i++) {
+            float x = (float)(i % 4) * 12.5f, y = (float)(i / 4) * 6.25f;
+            ray r = camera_ray(&c, x, y, 0.3f, 0.6f);
+            assert_true(r.d.x == 0 && r.d.y == 0 && r.d.z == -1);
+            assert_true(fabsf(r.o.x - 3 * (x / 20 - 1)) < 1e-6f);
+            assert_true(fabsf(r.o.y - 1.5f * (1 - y / 10)) < 1e-6f);
+            assert_true(r.o.z == 5 && r.tmin == 0.5f && r.tmax == 9);
+        }
+    }
+}
