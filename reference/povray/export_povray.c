@@ -3,6 +3,7 @@
 #include "export_povray_internal.h"
 #include "povray_glass.h"
 #include "povray_lamp.h"
+#include "povray_texture.h"
 
 #include "renderer/shading/bsdf.h"
 
@@ -23,9 +24,29 @@ struct povray_variant povray_variant_plain(void)
                                    .scale = 1};
 }
 
+/* How a shape looks. */
+struct look {
+    const struct material *specular; /* mirror, refraction, glass; NULL: diffuse */
+    rgb albedo;                      /* diffuse */
+    rgb radiance;
+    uint32_t material, reflectance_map, radiance_map; /* 0 and 0: no texture */
+    const char *flags;
+};
+
 /* Emission is multiplied by the pigment, so it is divided by it here. */
-static void put_surface(const struct povray_writer *w, rgb albedo, rgb radiance, double boost)
+static void put_surface(const struct povray_writer *w, const struct look *l, double boost)
 {
+    const rgb albedo = l->albedo, radiance = l->radiance;
+    if (l->reflectance_map != 0 && boost > 0) {
+        povray_put_texture(w, l->material, l->reflectance_map, rgb_scale(albedo, (float)boost));
+        fputs(" finish { diffuse 1 }", w->f);
+        return;
+    }
+    if (l->radiance_map != 0 && !rgb_is_zero(radiance)) {
+        povray_put_texture(w, l->material, l->radiance_map, radiance);
+        fputs(" finish { diffuse 0 emission S }", w->f);
+        return;
+    }
     double r = albedo.r * boost, g = albedo.g * boost, b = albedo.b * boost;
     if (rgb_is_zero(albedo) || boost == 0) {
         fputs("pigment { rgb 1 } finish { diffuse 0", w->f);
@@ -39,14 +60,6 @@ static void put_surface(const struct povray_writer *w, rgb albedo, rgb radiance,
                        "");
     fputs(" }", w->f);
 }
-
-/* How a shape looks. */
-struct look {
-    const struct material *specular; /* mirror, refraction, glass; NULL: diffuse */
-    rgb albedo;                      /* diffuse */
-    rgb radiance;
-    const char *flags;
-};
 
 static void put_mirror(const struct povray_writer *w, const struct look *l)
 {
@@ -75,12 +88,12 @@ static void put_diffuse(const struct povray_writer *w, const struct look *l)
     fputs("  texture { ", w->f);
     if (w->roulette > 0 && !rgb_is_zero(l->albedo)) {
         fprintf(w->f, "function { Fate(x,y,z) } texture_map {\n    [%.9g ", w->roulette);
-        put_surface(w, l->albedo, l->radiance, 0);
+        put_surface(w, l, 0);
         fprintf(w->f, "]\n    [%.9g ", w->roulette);
-        put_surface(w, l->albedo, l->radiance, 1 / (1 - w->roulette));
+        put_surface(w, l, 1 / (1 - w->roulette));
         fputs("] }", w->f);
     } else {
-        put_surface(w, l->albedo, l->radiance, 1);
+        put_surface(w, l, 1);
     }
     fputs(" }\n", w->f);
 }
@@ -125,6 +138,13 @@ static void put_mesh(const struct povray_writer *w, const struct object *o, doub
                 fputs(k == 0 ? ",\n    " : ",", w->f);
                 povray_put(w, povray_at(s->normal[3 * (size_t)i + (size_t)k]));
             }
+    }
+    if (material_has_map(&s->materials[o->material])) {
+        fprintf(w->f, " }\n  uv_vectors { %u", 3 * o->num_triangles);
+        for (size_t k = 3 * (size_t)o->first_triangle;
+             k < 3 * ((size_t)o->first_triangle + o->num_triangles); k++)
+            fprintf(w->f, "%s<%.9g,%.9g>", k % 6 == 0 ? ",\n    " : ",", (double)s->uv[k].u,
+                    (double)s->uv[k].v);
     }
     fprintf(w->f, " }\n  face_indices { %u", o->num_triangles);
     for (uint32_t i = 0; i < o->num_triangles; i++)
@@ -205,9 +225,16 @@ static void put_part(const struct povray_writer *w, const struct shape *s)
         put_glass_body(w, s, m);
         return;
     }
-    struct look look = {.albedo = m->reflectance, .flags = ""};
+    struct look look = {.albedo = m->reflectance,
+                        .material = s->object->material,
+                        .reflectance_map = m->reflectance_map,
+                        .radiance_map = m->radiance_map,
+                        .flags = ""};
     if (m->kind != MATERIAL_DIFFUSE)
-        look = (struct look){.specular = material_is_black(m) ? NULL : m, .flags = ""};
+        look = (struct look){.specular = material_is_black(m) ? NULL : m,
+                             .material = s->object->material,
+                             .radiance_map = m->radiance_map,
+                             .flags = ""};
     bool glows = w->pass->glow && !rgb_is_zero(m->radiance);
     if (glows)
         look.radiance = m->radiance;

@@ -40,7 +40,7 @@ bool povray_lamp(const struct scene *s, const struct light *l, struct povray_lam
     bool ball = l->kind == LIGHT_SPHERE;
     uint32_t material = ball ? s->sphere_material[l->first] : s->tri_material[l->first];
     const struct material *m = &s->materials[material];
-    if (!material_is_black(m) || m->radiance_both_sides ||
+    if (!material_is_black(m) || m->radiance_both_sides || l->textured ||
         (ball && s->spheres[l->first].normal_out < 0))
         return false;
     *out = (struct povray_lamp){.kind = ball ? POVRAY_BALL : POVRAY_MESH,

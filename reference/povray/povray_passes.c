@@ -2,6 +2,7 @@
 
 #include "povray_glass.h"
 #include "povray_lamp.h"
+#include "povray_texture.h"
 
 #include "reference/suite/features.h"
 #include "renderer/shading/bsdf.h"
@@ -29,16 +30,22 @@ static bool reflects(const struct material *m)
     return !material_is_black(m);
 }
 
-/* A plane does not see itself: there is no indirect light to wait for. */
-static bool one_plane_reflects(const struct scene *s, double extent)
+static bool reflects_or_glows(const struct material *m)
+{
+    return reflects(m) || !rgb_is_zero(m->radiance);
+}
+
+/* Of all surfaces that are `counted`. A plane does not see itself: there is no indirect light to wait for. */
+static bool is_one_plane(const struct scene *s, double extent,
+                         bool (*counted)(const struct material *))
 {
     for (uint32_t i = 0; i < s->num_spheres; i++)
-        if (reflects(&s->materials[s->sphere_material[i]]))
+        if (counted(&s->materials[s->sphere_material[i]]))
             return false;
     vec3 n = {0}, o = {0};
     bool found = false;
     for (uint32_t i = 0; i < s->num_triangles; i++) {
-        if (!reflects(&s->materials[s->tri_material[i]]))
+        if (!counted(&s->materials[s->tri_material[i]]))
             continue;
         const vec3 *p = &s->position[3 * (size_t)i];
         if (!found) {
@@ -63,7 +70,8 @@ static bool check_material(const struct material *m, struct err *e)
     if (m->kind != MATERIAL_DIFFUSE)
         return true;
     rgb a = m->reflectance, l = m->radiance;
-    if (reflects(m) && ((a.r == 0 && l.r > 0) || (a.g == 0 && l.g > 0) || (a.b == 0 && l.b > 0)))
+    if (reflects(m) && !material_has_map(m) &&
+        ((a.r == 0 && l.r > 0) || (a.g == 0 && l.g > 0) || (a.b == 0 && l.b > 0)))
         return err_set(
             e, "POV-Ray cannot express material '%s': it emits a colour it does not reflect",
             m->name);
@@ -162,7 +170,10 @@ static bool plan_lights(const struct scene *s, struct povray_passes *p, struct c
                 n->lamps++;
             else
                 n->glow = true;
-            p->radiance = fmax(p->radiance, (double)rgb_max(s->materials[material].radiance));
+            const struct material *m = &s->materials[material];
+            rgb most =
+                m->radiance_map != 0 ? texture_max(&s->textures[m->radiance_map - 1]) : grey(1);
+            p->radiance = fmax(p->radiance, (double)rgb_max(rgb_mul(m->radiance, most)));
             break;
         }
         }
@@ -189,10 +200,11 @@ static void plan_passes(const struct scene *s, const struct census *n, int depth
                         struct povray_passes *p)
 {
     struct povray_pass lit = {.sources = true}, seen = {.glow = true};
-    bool lone = one_plane_reflects(s, p->extent);
+    bool lone = is_one_plane(s, p->extent, reflects);
+    bool flat = s->environment == NULL && is_one_plane(s, p->extent, reflects_or_glows);
     if (depth > 1 && !lone)
         lit.recursion = depth - 1;
-    if (n->diffuse && n->glow)
+    if (n->diffuse && n->glow && !flat)
         seen.recursion = depth;
     else if (n->diffuse && n->specular && n->lamps > 0 && depth > 1)
         seen.recursion =
@@ -249,7 +261,7 @@ bool povray_passes(const struct scene *s, const struct camera *c, int depth,
         if (!check_material(&s->materials[i], e))
             return false;
     count_materials(s, &n);
-    if (!features_check_normals("POV-Ray", s, e) || !features_check_textures("POV-Ray", s, e) ||
+    if (!features_check_normals("POV-Ray", s, e) || !povray_check_textures(s, e) ||
         !check_camera(s, c, p.extent, e) || !povray_check_glass(s, c, p.extent, e) ||
         !plan_lights(s, &p, &n, e))
         return false;

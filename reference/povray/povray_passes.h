@@ -42,7 +42,8 @@ struct povray_passes {
 /* Looks the scene over for images with paths of 0 .. depth bounces. Fails if POV-Ray cannot
  * express it: lens, clipping planes that cut geometry, microfacets, point and spot lights whose
  * falloff is neither constant nor purely quadratic, the assignment's hidden ambient light,
- * environment images of more than POVRAY_MOST_TEXELS rows or columns, an emitter that reflects no
+ * environment images of more than POVRAY_MOST_TEXELS rows or columns, textures that povray_texture.h
+ * refuses, an emitter that reflects no
  * red, green or blue but emits it while reflecting others, glass that povray_glass.h refuses, depth
  * beyond what is verified, shading normals behind their triangle, and sizes at which POV-Ray's fixed
  * tolerances show. */

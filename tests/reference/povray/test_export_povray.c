@@ -34,9 +34,9 @@ static struct povray_passes plan(struct scene *s, int depth)
     return p;
 }
 
-/* The exported text; the caller frees. */
-static char *text_of(const struct scene *s, const struct camera *c, int depth,
-                     const struct povray_variant *v)
+/* The exported text; the caller frees. Inlined, gcc 12 takes what it returns for a pointer into its frame. */
+static __attribute__((noinline)) char *text_of(const struct scene *s, const struct camera *c,
+                                               int depth, const struct povray_variant *v)
 {
     struct err e;
     char *text = NULL;
@@ -178,6 +178,75 @@ TEST(test_lights_refused)
 }
 
 /* All ways to cut a parallelogram and to number its corners give the same set of points. */
+/* Two texels along u, mirrored, on coordinates 0 .. 1.5 times 2: texels 0 to 3 and one more to each side, the fourth of which is the
+ * first again. Nearest has each colour from edge to edge, bilinear once, at its centre. The lamp with a texture is none. */
+TEST(test_textures)
+{
+    const rgb texels[2] = {{.125f, .25f, .5f}, {.75f, .5f, .25f}};
+    for (int nearest = 0; nearest < 2; nearest++) {
+        struct scene s = floor_and_ball(true);
+        struct povray_lamp lamp;
+        uint32_t map = build_texture(&s, 2, 1, texels, nearest, TEXTURE_MIRROR);
+        for (size_t k = 6; k < 12; k++)
+            s.uv[k].u *= 1.5f;
+        s.materials[1].radiance_map = map;
+        struct camera c = build_finish(&s, 40, 30);
+        assert_false(povray_lamp(&s, &s.lights[0], &lamp));
+        const struct povray_variant v = povray_variant_plain();
+        char *text = text_of(&s, &c, 1, &v);
+        static const char *const parts[2][4] = {
+            {"function { x*0.33333333333333331 - -0.16666666666666666 } color_map {\n      [0.0833333333 rgb <0.375,0.5,0.5>] "
+             "[0.25 rgb <0.375,0.5,0.5>] [0.416666667 rgb <2.25,1,0.25>] [0.583333333 rgb <2.25,1,0.25>]\n      "
+             "[0.75 rgb <0.375,0.5,0.5>]",
+             "finish { diffuse 0 emission S }", "uv_vectors { 6,\n    <0,0>,<1.5,0>,<1.5,1>",
+             "uv_mapping"},
+            {"[0 rgb <0.375,0.5,0.5>] [0.166666667 rgb <0.375,0.5,0.5>] [0.166666667 rgb <0.375,0.5,0.5>] [0.333333333 rgb "
+             "<0.375,0.5,0.5>] [0.333333333 rgb <2.25,1,0.25>]",
+             "finish { diffuse 0 emission S }", "uv_vectors", "uv_mapping"}};
+        for (int i = 0; i < 4; i++)
+            if (strstr(text, parts[nearest][i]) == NULL)
+                fail_msg("no %s in %.900s", parts[nearest][i], strstr(text, "uv_mapping"));
+        free(text);
+        scene_free(&s);
+    }
+}
+
+TEST(test_textures_refused)
+{
+    static const struct {
+        float scale;
+        rgb albedo;
+        bool nearest;
+        const char *says;
+    } cases[] = {
+        {1, {0, 0, 0}, true, NULL},
+        {62, {0, 0, 0}, true, NULL}, /* 62 x 2 texels and 3 around are 127 */
+        {63,
+         {0, 0, 0},
+         true,
+         "POV-Ray: material 'm' shows 129 x 66 texels, edges written out, of which 127 x 127"},
+        {63, {0, 0, 0}, false, NULL},
+        {126, {0, 0, 0}, false, "of which 254 x 254 is the most"},
+        {1, {0, .1f, 0}, false, "material 'm': it reflects and glows, one of both with a texture"},
+    };
+    for (size_t i = 0; i < COUNT(cases); i++) {
+        const rgb texels[2] = {{.1f, .2f, .5f}, {.7f, .5f, .3f}};
+        struct err e = {""};
+        struct povray_passes p;
+        struct scene s = floor_and_ball(true);
+        s.materials[1].radiance_map =
+            build_texture(&s, 2, 1, texels, cases[i].nearest, TEXTURE_WRAP);
+        s.materials[1].reflectance = cases[i].albedo;
+        build_uv(&s, 2, cases[i].scale, (struct uv){0, 0});
+        struct camera c = build_finish(&s, 40, 30);
+        if (cases[i].says == NULL)
+            MUST(povray_passes(&s, &c, 1, &p, &e));
+        else
+            REFUSES(povray_passes(&s, &c, 1, &p, &e), cases[i].says);
+        scene_free(&s);
+    }
+}
+
 TEST(test_lamp_any_numbering)
 {
     const vec3 corner[4] = {{0, 1, 0}, {.5f, 1.25f, 0}, {.75f, 1.25f, 1}, {.25f, 1, 1}};
