@@ -14,6 +14,7 @@ enum { LEVEL = 4 };
 struct exr_zip {
     size_t width, channels;
     struct libdeflate_compressor *compressor;
+    struct libdeflate_decompressor *decompressor;
     int *from;
     uint8_t *raw, *mixed, *packed;
     size_t room; /* of packed */
@@ -28,17 +29,19 @@ struct exr_zip *exr_zip_new(int width, int channels, const int *from, int rows)
     z->width = (size_t)width;
     z->channels = (size_t)channels;
     z->compressor = libdeflate_alloc_compressor(LEVEL);
+    z->decompressor = libdeflate_alloc_decompressor();
     z->room = libdeflate_zlib_compress_bound(z->compressor, most);
     z->from = malloc(z->channels * sizeof *z->from);
     z->raw = malloc(most);
     z->mixed = malloc(most);
     z->packed = malloc(z->room);
-    if (z->compressor == NULL || z->from == NULL || z->raw == NULL || z->mixed == NULL ||
-        z->packed == NULL) {
+    if (z->compressor == NULL || z->decompressor == NULL || z->from == NULL || z->raw == NULL ||
+        z->mixed == NULL || z->packed == NULL) {
         exr_zip_free(z);
         return NULL;
     }
-    memcpy(z->from, from, z->channels * sizeof *from);
+    if (from != NULL)
+        memcpy(z->from, from, z->channels * sizeof *from);
     return z;
 }
 
@@ -47,6 +50,7 @@ void exr_zip_free(struct exr_zip *z)
     if (z == NULL)
         return;
     libdeflate_free_compressor(z->compressor);
+    libdeflate_free_decompressor(z->decompressor);
     free(z->from);
     free(z->raw);
     free(z->mixed);
@@ -76,4 +80,22 @@ const void *exr_zip_rows(struct exr_zip *z, const float *rows, int num, size_t *
         return z->packed;
     *size = length;
     return z->raw;
+}
+
+const float *exr_zip_unpack(struct exr_zip *z, const void *bytes, size_t size, int num)
+{
+    const size_t length = (size_t)num * z->width * z->channels * sizeof(float);
+    uint8_t *even = z->mixed, *odd = z->mixed + length / 2, last = 128;
+    if (size == length)
+        return memcpy(z->raw, bytes, size);
+    if (libdeflate_zlib_decompress(z->decompressor, bytes, size, z->mixed, length, NULL) !=
+        LIBDEFLATE_SUCCESS)
+        return NULL;
+    for (size_t i = 0; i < length; i++)
+        z->mixed[i] = last = (uint8_t)(last + z->mixed[i] - 128);
+    for (size_t i = 0; i < length / 2; i++) {
+        z->raw[2 * i] = even[i];
+        z->raw[2 * i + 1] = odd[i];
+    }
+    return (const float *)(const void *)z->raw;
 }

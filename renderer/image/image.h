@@ -50,7 +50,21 @@ enum { IMAGE_MAX_SIDE = 1 << 16, IMAGE_MAX_CHANNELS = 4096 };
  * channel. */
 bool image_read_exr(const char *path, struct image *out, bool *half, struct err *e)
     __attribute__((warn_unused_result));
-/* Its header alone: data stays NULL. */
+/* The same by rows, of an image that need not be in memory as a whole. NULL with a line on failure; `path` has to last. */
+struct image_reader;
+struct image_reader *image_reader_open(const char *path, struct err *e)
+    __attribute__((warn_unused_result));
+/* Shape, names and attributes: the reader's, or whose who takes and zeroes it after the last row. */
+struct image *image_reader_head(struct image_reader *r);
+bool image_reader_is_half(const struct image_reader *r);
+/* The next *num rows, as many as the file packs together: channel after channel within a row. They belong to the reader and
+ * last until the next call. NULL with a line on failure. */
+const float *image_reader_rows(struct image_reader *r, int *num, struct err *e)
+    __attribute__((warn_unused_result));
+void image_reader_close(struct image_reader *r);
+/* Puts such rows in their place in an image. */
+void image_put_rows(struct image *im, int y, const float *rows, int num);
+/* The header alone: data stays NULL. */
 bool image_read_exr_head(const char *path, struct image *out, struct err *e)
     __attribute__((warn_unused_result));
 /* Reads a Radiance image (RGBE, rows from the top) as R G B. */

@@ -1,4 +1,4 @@
-/* OpenEXR files through the C interface of its own library, which loads in a millisecond. */
+/* OpenEXR files, written by the C interface of its own library, which loads in a millisecond. */
 #define _GNU_SOURCE
 #include "exr_zip.h"
 #include "renderer/base/fs.h"
@@ -12,53 +12,18 @@
 #include <string.h>
 #include <unistd.h>
 
-/* What the library hands back to us: the open file, and its first complaint. */
+/* What the library hands back to us: the open file, and why it could not be written. */
 struct stream {
     int fd;
     char why[200];
-    bool no_memory; /* for a text of the header: OpenEXR leaves it out and goes on */
 };
 
-/* Only while reading: a file that is written holds its lock where memory runs out, and asking it for our data would
- * wait for that forever. */
-static void keep_complaint(exr_const_context_t f, exr_result_t code, const char *msg)
-{
-    void *s = NULL;
-    if (f == NULL || exr_get_user_data(f, &s) != EXR_ERR_SUCCESS || s == NULL)
-        return;
-    struct stream *stream = s;
-    stream->no_memory |= code == EXR_ERR_OUT_OF_MEMORY;
-    if (stream->why[0] == '\0')
-        snprintf(stream->why, sizeof stream->why, "%s", msg);
-}
-
+/* A file that is written holds its lock where memory runs out, and asking it for our data would wait for that forever. */
 static void drop_complaint(exr_const_context_t f, exr_result_t code, const char *msg)
 {
     (void)f;
     (void)code;
     (void)msg;
-}
-
-static int64_t read_at(exr_const_context_t f, void *s, void *buffer, uint64_t size, uint64_t offset,
-                       exr_stream_error_func_ptr_t error)
-{
-    uint64_t done = 0;
-    while (done < size) {
-        ssize_t n = pread(((struct stream *)s)->fd, (char *)buffer + done, size - done,
-                          (off_t)(offset + done));
-        if (n < 0)
-            return error(f, EXR_ERR_READ_IO, "%s", strerror(errno)), -1;
-        if (n == 0)
-            break;
-        done += (uint64_t)n;
-    }
-    return (int64_t)done;
-}
-
-static int64_t size_of(exr_const_context_t f, void *s)
-{
-    (void)f;
-    return lseek(((struct stream *)s)->fd, 0, SEEK_END);
 }
 
 static int64_t write_at(exr_const_context_t f, void *s, const void *buffer, uint64_t size,
@@ -81,34 +46,17 @@ static int64_t write_at(exr_const_context_t f, void *s, const void *buffer, uint
 static exr_context_initializer_t initializer(struct stream *s)
 {
     exr_context_initializer_t init = EXR_DEFAULT_CONTEXT_INITIALIZER;
-    init.error_handler_fn = keep_complaint;
+    init.error_handler_fn = drop_complaint;
     init.user_data = s;
-    init.read_fn = read_at;
-    init.size_fn = size_of;
     init.write_fn = write_at;
     init.max_image_width = init.max_image_height = IMAGE_MAX_SIDE;
     return init;
 }
 
-static bool failed(const char *path, const char *what, const struct stream *s, exr_result_t code,
-                   struct err *e)
+static bool failed(const char *path, const struct stream *s, exr_result_t code, struct err *e)
 {
-    return err_set(e, "%s: cannot %s: %s", path, what,
+    return err_set(e, "%s: cannot write: %s", path,
                    s->why[0] != '\0' ? s->why : exr_get_default_error_message(code));
-}
-
-/* Where the pixels of each channel of a chunk go in the interleaved image: the first is number
- * `at`. */
-static void point_channels(exr_coding_channel_info_t *c, int num, const struct image *im, size_t at)
-{
-    for (int k = 0; k < num; k++) {
-        c[k].user_bytes_per_element = sizeof(float);
-        c[k].user_data_type = EXR_PIXEL_FLOAT;
-        c[k].user_pixel_stride = im->channels * (int32_t)sizeof(float);
-        c[k].user_line_stride = im->width * c[k].user_pixel_stride;
-        c[k].decode_to_ptr = (uint8_t *)(im->data + at * (size_t)im->channels +
-                                         image_channel(im, c[k].channel_name));
-    }
 }
 
 static exr_result_t write_header(exr_context_t f, const struct image *im)
@@ -168,7 +116,6 @@ struct image_writer *image_writer_open(const char *path, const struct image *hea
     w->head = head;
     w->s.fd = fileno(w->file.f);
     exr_context_initializer_t init = initializer(&w->s);
-    init.error_handler_fn = drop_complaint;
     exr_result_t r = exr_start_write(&w->f, path, EXR_WRITE_FILE_DIRECTLY, &init);
     if (r == EXR_ERR_SUCCESS)
         r = write_header(w->f, head);
@@ -176,7 +123,7 @@ struct image_writer *image_writer_open(const char *path, const struct image *hea
         r = start_rows(w);
     if (r == EXR_ERR_SUCCESS)
         return w;
-    failed(path, "write", &w->s, r, e);
+    failed(path, &w->s, r, e);
     image_writer_abandon(w);
     return NULL;
 }
@@ -189,7 +136,7 @@ bool image_writer_rows(struct image_writer *w, const float *rows, int num, struc
     const void *bytes = exr_zip_rows(w->zip, rows, num, &size);
     exr_result_t r = exr_write_scanline_chunk(w->f, 0, w->y, bytes, size);
     w->y += num;
-    return r == EXR_ERR_SUCCESS || failed(w->file.path, "write", &w->s, r, e);
+    return r == EXR_ERR_SUCCESS || failed(w->file.path, &w->s, r, e);
 }
 
 bool image_writer_close(struct image_writer *w, struct err *e)
@@ -200,7 +147,7 @@ bool image_writer_close(struct image_writer *w, struct err *e)
     if (ok) {
         ok = out_commit(&w->file, e);
     } else {
-        failed(w->file.path, "write", &w->s, r, e);
+        failed(w->file.path, &w->s, r, e);
         out_abandon(&w->file);
     }
     exr_zip_free(w->zip);
@@ -232,147 +179,4 @@ bool image_write_exr(const char *path, const struct image *im, struct err *e)
         }
     }
     return image_writer_close(w, e);
-}
-
-/* An image of the shape that the header says, and its texts. */
-static bool read_header(exr_context_t f, const char *path, const struct stream *s, bool pixels,
-                        struct image *im, bool *half, struct err *e)
-{
-    const exr_attr_chlist_t *list;
-    exr_attr_box2i_t w;
-    exr_storage_t storage;
-    int32_t num_attrs;
-    exr_result_t r = exr_get_channels(f, 0, &list);
-    if (r == EXR_ERR_SUCCESS)
-        r = exr_get_data_window(f, 0, &w);
-    if (r == EXR_ERR_SUCCESS)
-        r = exr_get_storage(f, 0, &storage);
-    if (r == EXR_ERR_SUCCESS)
-        r = exr_get_attribute_count(f, 0, &num_attrs);
-    if (r != EXR_ERR_SUCCESS)
-        return failed(path, "read", s, r, e);
-    if (storage != EXR_STORAGE_SCANLINE && storage != EXR_STORAGE_TILED)
-        return err_set(e, "%s: has deep pixels", path);
-    int64_t width = (int64_t)w.max.x - w.min.x + 1, height = (int64_t)w.max.y - w.min.y + 1;
-    int channels = list->num_channels;
-    if (channels < 1 || channels > IMAGE_MAX_CHANNELS || width > IMAGE_MAX_SIDE ||
-        height > IMAGE_MAX_SIDE || (double)width * (double)height * channels > IMAGE_MAX_FLOATS)
-        return err_set(e, "%s: an image of %lld x %lld x %d is more than this program takes", path,
-                       (long long)width, (long long)height, channels);
-    const char *names[IMAGE_MAX_CHANNELS];
-    double bytes = 0;
-    *half = false;
-    for (int c = 0; c < channels; c++) {
-        const exr_attr_chlist_entry_t *ch = &list->entries[c];
-        names[c] = ch->name.str;
-        *half |= ch->pixel_type == EXR_PIXEL_HALF;
-        bytes += (double)width * (double)height * (ch->pixel_type == EXR_PIXEL_HALF ? 2 : 4);
-        if (ch->pixel_type == EXR_PIXEL_UINT || ch->x_sampling != 1 || ch->y_sampling != 1 ||
-            ch->name.length >= (int)sizeof im->names[0])
-            return err_set(e, "%s: channel %.64s is not a float for each pixel", path, names[c]);
-    }
-    off_t size = lseek(s->fd, 0, SEEK_END);
-    if (bytes > IMAGE_MAX_EXPANSION * (double)size)
-        return err_set(e, "%s: an image of %lld x %lld x %d cannot be in %lld bytes", path,
-                       (long long)width, (long long)height, channels, (long long)size);
-    if (!(pixels ? image_alloc : image_head)(im, (int)width, (int)height, channels, names, e))
-        return err_prefix(e, "%s", path);
-    /* "type" says how the file is made, not what of, and a writer has its own. */
-    for (int i = 0; i < num_attrs; i++) {
-        const exr_attribute_t *a;
-        if (exr_get_attribute_by_index(f, 0, EXR_ATTR_LIST_FILE_ORDER, i, &a) == EXR_ERR_SUCCESS &&
-            a->type == EXR_ATTR_STRING && strcmp(a->name, "type") != 0 &&
-            !image_set_attr(im, a->name, a->string->str, e))
-            return err_prefix(e, "%s", path);
-    }
-    return true;
-}
-
-/* One chunk, whose first pixel is number `at`. */
-static exr_result_t read_chunk(exr_context_t f, const exr_chunk_info_t *chunk, struct image *im,
-                               size_t at)
-{
-    exr_decode_pipeline_t decoder = EXR_DECODE_PIPELINE_INITIALIZER;
-    exr_result_t r = exr_decoding_initialize(f, 0, chunk, &decoder);
-    if (r == EXR_ERR_SUCCESS) {
-        point_channels(decoder.channels, decoder.channel_count, im, at);
-        r = exr_decoding_choose_default_routines(f, 0, &decoder);
-    }
-    if (r == EXR_ERR_SUCCESS)
-        r = exr_decoding_run(f, 0, &decoder);
-    exr_decoding_destroy(f, &decoder);
-    return r;
-}
-
-static exr_result_t read_rows(exr_context_t f, struct image *im)
-{
-    exr_chunk_info_t chunk;
-    exr_attr_box2i_t w;
-    int32_t rows;
-    exr_result_t r = exr_get_scanlines_per_chunk(f, 0, &rows);
-    if (r == EXR_ERR_SUCCESS)
-        r = exr_get_data_window(f, 0, &w);
-    for (int y = 0; r == EXR_ERR_SUCCESS && y < im->height; y += rows) {
-        r = exr_read_scanline_chunk_info(f, 0, w.min.y + y, &chunk);
-        if (r == EXR_ERR_SUCCESS)
-            r = read_chunk(f, &chunk, im, (size_t)y * (size_t)im->width);
-    }
-    return r;
-}
-
-static exr_result_t read_tiles(exr_context_t f, struct image *im)
-{
-    exr_chunk_info_t chunk;
-    int32_t tw, th;
-    exr_result_t r = exr_get_tile_sizes(f, 0, 0, 0, &tw, &th);
-    for (int y = 0; r == EXR_ERR_SUCCESS && y < im->height; y += th)
-        for (int x = 0; r == EXR_ERR_SUCCESS && x < im->width; x += tw) {
-            r = exr_read_tile_chunk_info(f, 0, x / tw, y / th, 0, 0, &chunk);
-            if (r == EXR_ERR_SUCCESS)
-                r = read_chunk(f, &chunk, im, (size_t)y * (size_t)im->width + (size_t)x);
-        }
-    return r;
-}
-
-/* The pixels too, or the header alone. */
-static bool read_exr(const char *path, bool pixels, struct image *out, bool *half, struct err *e)
-{
-    struct stream s = {.fd = fs_open_fd(path)};
-    if (s.fd < 0)
-        return err_set(e, "%s: cannot read: %s", path, strerror(errno));
-    exr_context_initializer_t init = initializer(&s);
-    exr_context_t f = NULL;
-    exr_storage_t storage = EXR_STORAGE_SCANLINE;
-    struct image im = {0};
-    bool small = false;
-    exr_result_t r = exr_start_read(&f, path, &init);
-    if (r == EXR_ERR_SUCCESS && s.no_memory)
-        r = EXR_ERR_OUT_OF_MEMORY;
-    bool ok = r == EXR_ERR_SUCCESS || failed(path, "read", &s, r, e);
-    ok = ok && read_header(f, path, &s, pixels, &im, &small, e);
-    if (ok && pixels) {
-        exr_get_storage(f, 0, &storage);
-        r = storage == EXR_STORAGE_TILED ? read_tiles(f, &im) : read_rows(f, &im);
-        ok = r == EXR_ERR_SUCCESS || failed(path, "read", &s, r, e);
-    }
-    exr_finish(&f);
-    close(s.fd);
-    if (!ok) {
-        image_free(&im);
-        return false;
-    }
-    *out = im;
-    if (half != NULL)
-        *half = small;
-    return true;
-}
-
-bool image_read_exr(const char *path, struct image *out, bool *half, struct err *e)
-{
-    return read_exr(path, true, out, half, e);
-}
-
-bool image_read_exr_head(const char *path, struct image *out, struct err *e)
-{
-    return read_exr(path, false, out, NULL, e);
 }

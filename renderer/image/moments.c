@@ -3,26 +3,51 @@
 #include "renderer/base/huge_alloc.h"
 
 #include <assert.h>
+#include <float.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-bool moments_alloc(struct moments *m, int width, int height, struct err *e)
+static bool alloc_doubles(struct moments *m, struct err *e)
 {
-    *m = (struct moments){.width = width, .height = height, .unit = "sample", .spp = 1};
-    if (width < 1 || height < 1)
-        return err_set(e, "cannot make moments of %d x %d pixels", width, height);
-    size_t pixels = (size_t)width * (size_t)height;
+    size_t pixels = (size_t)m->width * (size_t)m->height;
     m->n = huge_calloc(pixels, sizeof *m->n);
     m->mean = huge_calloc(3 * pixels, sizeof *m->mean);
     m->m2 = huge_calloc(3 * pixels, sizeof *m->m2);
     m->m3 = huge_calloc(3 * pixels, sizeof *m->m3);
-    if (m->n == NULL || m->mean == NULL || m->m2 == NULL || m->m3 == NULL) {
-        moments_free(m);
-        return err_set(e, "out of memory for moments of %d x %d pixels", width, height);
-    }
+    return (m->n != NULL && m->mean != NULL && m->m2 != NULL && m->m3 != NULL) ||
+           err_set(e, "out of memory for moments of %d x %d pixels", m->width, m->height);
+}
+
+/* In one piece, which begins with n. */
+static bool alloc_packed(struct moments *m, struct err *e)
+{
+    size_t pixels = (size_t)m->width * (size_t)m->height;
+    float *n = huge_alloc(10 * pixels * sizeof *n);
+    if (n == NULL)
+        return err_set(e, "out of memory for moments of %d x %d pixels", m->width, m->height);
+    m->packed.n = n;
+    m->packed.mean = n + pixels;
+    m->packed.m2 = n + 4 * pixels;
+    m->packed.m3 = n + 7 * pixels;
     return true;
+}
+
+static struct moments empty(int width, int height)
+{
+    return (struct moments){.width = width, .height = height, .unit = "sample", .spp = 1};
+}
+
+bool moments_alloc(struct moments *m, int width, int height, struct err *e)
+{
+    *m = empty(width, height);
+    if (width < 1 || height < 1)
+        return err_set(e, "cannot make moments of %d x %d pixels", width, height);
+    if (alloc_doubles(m, e))
+        return true;
+    moments_free(m);
+    return false;
 }
 
 void moments_free(struct moments *m)
@@ -32,6 +57,7 @@ void moments_free(struct moments *m)
     free(m->m2);
     free(m->m3);
     free(m->tolerance);
+    free(m->packed.n);
     *m = (struct moments){0};
 }
 
@@ -102,22 +128,29 @@ struct moments moments_run(const struct moments *m, size_t first, int num)
     struct moments run = *m;
     run.width = num;
     run.height = 1;
-    run.n += first;
-    run.mean += 3 * first;
-    run.m2 += 3 * first;
-    run.m3 += 3 * first;
+    if (m->n != NULL) {
+        run.n += first;
+        run.mean += 3 * first;
+        run.m2 += 3 * first;
+        run.m3 += 3 * first;
+    } else {
+        run.packed.n += first;
+        run.packed.mean += 3 * first;
+        run.packed.m2 += 3 * first;
+        run.packed.m3 += 3 * first;
+    }
     run.tolerance = m->tolerance != NULL ? m->tolerance + 3 * first : NULL;
     return run;
 }
 
 double moments_var_of_mean(const struct moments *m, size_t pixel, int channel)
 {
-    double n = m->n[pixel];
+    double n = moments_n(m, pixel);
     if (strcmp(m->unit, "exact") == 0)
         return 0;
     if (strcmp(m->unit, "stratified") == 0)
         return NAN;
-    return n < 2 ? NAN : m->m2[3 * pixel + (size_t)channel] / (n * (n - 1));
+    return n < 2 ? NAN : moments_m2(m, 3 * pixel + (size_t)channel) / (n * (n - 1));
 }
 
 static const char *const channel_names[10] = {"R",    "G",    "B",    "M2.R", "M2.G",
@@ -240,80 +273,145 @@ bool moments_write(const char *path, const struct moments *m, const struct image
     return moments_write_layers(path, m, NULL, attrs, num_attrs, e);
 }
 
-/* One pixel of a moments EXR: finite, M2 >= 0, n a whole number >= 0. */
-static bool pixel_is_valid(const float *px, const int at[10])
+/* One value of a moments EXR: finite, M2 (channels 3 to 5) >= 0, n (channel 9) a whole number >= 0. */
+static bool is_valid(float v, int channel)
 {
-    for (int c = 0; c < 10; c++)
-        if (!isfinite(px[at[c]]))
+    const bool least = channel < 3 || (channel > 5 && channel < 9) || v >= 0;
+    return fabsf(v) <= FLT_MAX && least && (channel < 9 || v >= 0x1p23f || v == (float)(int)v);
+}
+
+/* What a moments EXR says of itself, and where its channels are. */
+static bool read_head(const char *path, struct image_reader *r, struct moments *m, int at[10],
+                      struct err *e)
+{
+    const struct image *head = image_reader_head(r);
+    const char *unit = image_get_attr(head, "assay:unit"), *spp = image_get_attr(head, "assay:spp");
+    char *end;
+    bool has_all = unit != NULL && spp != NULL && strlen(unit) < sizeof m->unit;
+    for (int c = 0; c < 10; c++) {
+        at[c] = image_channel(head, channel_names[c]);
+        has_all = has_all && at[c] >= 0;
+    }
+    if (!has_all)
+        return err_set(e,
+                       "%s: not a moments EXR (channels R G B M2.* M3.* n, attributes assay:unit, "
+                       "assay:spp)",
+                       path);
+    if (image_reader_is_half(r))
+        return err_set(e, "%s: moments need 32-bit floats, this file has fewer bits", path);
+    if (strcmp(unit, "sample") != 0 && strcmp(unit, "replicate") != 0 &&
+        strcmp(unit, "exact") != 0 && strcmp(unit, "stratified") != 0 &&
+        strcmp(unit, "picture") != 0)
+        return err_set(e, "%s: unknown unit of observation '%s'", path, unit);
+    *m = empty(head->width, head->height);
+    strcpy(m->unit, unit);
+    m->spp = strtod(spp, &end);
+    return !(end == spp || *end != '\0' || !(m->spp >= 0 && m->spp < 1e15)) ||
+           err_set(e, "%s: assay:spp '%s' is not a number of samples", path, spp);
+}
+
+/* Row y, whose channels begin at `row`. */
+static bool take_row(const char *path, struct moments *m, const int at[10], size_t y,
+                     const float *row, struct err *e)
+{
+    double *const out[4] = {m->mean, m->m2, m->m3, m->n};
+    float *const packed[4] = {m->packed.mean, m->packed.m2, m->packed.m3, m->packed.n};
+    const size_t width = (size_t)m->width;
+    size_t bad = width;
+    for (int c = 0; c < 10; c++) {
+        const size_t part = (size_t)c / 3, stride = c < 9 ? 3 : 1,
+                     first = stride * y * width + (size_t)c % 3;
+        const float *v = row + (size_t)at[c] * width;
+        bool all_valid = true;
+        for (size_t x = 0; x < width; x++)
+            all_valid &= is_valid(v[x], c);
+        for (size_t x = 0; !all_valid && x < bad; x++)
+            if (!is_valid(v[x], c))
+                bad = x;
+        if (m->n != NULL)
+            for (size_t x = 0; x < width; x++)
+                out[part][first + stride * x] = v[x];
+        else
+            for (size_t x = 0; x < width; x++)
+                packed[part][first + stride * x] = v[x];
+    }
+    return bad == width ||
+           err_set(e, "%s: pixel (%zu, %zu) is not finite or has a negative M2 or count", path, bad,
+                   y);
+}
+
+static bool read_rows(struct image_reader *r, const char *path, const int at[10], struct moments *m,
+                      struct image *image, struct err *e)
+{
+    const size_t size = (size_t)m->width * (size_t)image_reader_head(r)->channels;
+    for (int num = 0, y = 0; y < m->height; y += num) {
+        const float *rows = image_reader_rows(r, &num, e);
+        if (rows == NULL)
             return false;
-    float n = px[at[9]];
-    return px[at[3]] >= 0 && px[at[4]] >= 0 && px[at[5]] >= 0 && n >= 0 && n == floorf(n);
+        for (int k = 0; k < num; k++)
+            if (!take_row(path, m, at, (size_t)(y + k), rows + (size_t)k * size, e))
+                return false;
+        if (image != NULL)
+            image_put_rows(image, y, rows, num);
+    }
+    return true;
+}
+
+static bool read_as(bool (*alloc)(struct moments *m, struct err *e), const char *path,
+                    struct moments *out, struct image *image, struct err *e)
+{
+    struct moments m = {0};
+    int at[10];
+    struct image_reader *r = image_reader_open(path, e);
+    if (r == NULL)
+        return false;
+    bool ok = read_head(path, r, &m, at, e) && alloc(&m, e);
+    struct image im = *image_reader_head(r);
+    if (ok && image != NULL) {
+        im.data =
+            malloc((size_t)im.width * (size_t)im.height * (size_t)im.channels * sizeof *im.data);
+        ok = im.data != NULL || err_set(e, "%s: out of memory", path);
+    }
+    ok = ok && read_rows(r, path, at, &m, im.data != NULL ? &im : NULL, e);
+    if (ok && image != NULL) {
+        *image = im;
+        *image_reader_head(r) = (struct image){0};
+    } else {
+        free(im.data);
+    }
+    if (ok)
+        *out = m;
+    else
+        moments_free(&m);
+    image_reader_close(r);
+    return ok;
 }
 
 bool moments_read(const char *path, struct moments *out, struct image *image, struct err *e)
 {
-    struct image im = {0};
-    struct moments m = {0};
-    bool half;
-    if (!image_read_exr(path, &im, &half, e))
+    return read_as(alloc_doubles, path, out, image, e);
+}
+
+bool moments_read_packed(const char *path, struct moments *out, struct err *e)
+{
+    return read_as(alloc_packed, path, out, NULL, e);
+}
+
+bool moments_unpack(struct moments *m, struct err *e)
+{
+    size_t pixels = (size_t)m->width * (size_t)m->height;
+    if (m->n != NULL)
+        return true;
+    if (!alloc_doubles(m, e))
         return false;
-    const char *unit = image_get_attr(&im, "assay:unit");
-    const char *spp = image_get_attr(&im, "assay:spp");
-    int at[10];
-    bool has_all = unit != NULL && spp != NULL && strlen(unit) < sizeof m.unit;
-    for (int c = 0; c < 10; c++) {
-        at[c] = image_channel(&im, channel_names[c]);
-        has_all = has_all && at[c] >= 0;
+    for (size_t p = 0; p < pixels; p++)
+        m->n[p] = m->packed.n[p];
+    for (size_t i = 0; i < 3 * pixels; i++) {
+        m->mean[i] = m->packed.mean[i];
+        m->m2[i] = m->packed.m2[i];
+        m->m3[i] = m->packed.m3[i];
     }
-    if (!has_all) {
-        err_set(e,
-                "%s: not a moments EXR (channels R G B M2.* M3.* n, attributes assay:unit, "
-                "assay:spp)",
-                path);
-        goto fail;
-    }
-    if (half) {
-        err_set(e, "%s: moments need 32-bit floats, this file has fewer bits", path);
-        goto fail;
-    }
-    if (strcmp(unit, "sample") != 0 && strcmp(unit, "replicate") != 0 &&
-        strcmp(unit, "exact") != 0 && strcmp(unit, "stratified") != 0 &&
-        strcmp(unit, "picture") != 0) {
-        err_set(e, "%s: unknown unit of observation '%s'", path, unit);
-        goto fail;
-    }
-    if (!moments_alloc(&m, im.width, im.height, e))
-        goto fail;
-    strcpy(m.unit, unit);
-    char *end;
-    m.spp = strtod(spp, &end);
-    if (end == spp || *end != '\0' || !(m.spp >= 0 && m.spp < 1e15)) {
-        err_set(e, "%s: assay:spp '%s' is not a number of samples", path, spp);
-        goto fail;
-    }
-    size_t pixels = (size_t)m.width * (size_t)m.height;
-    for (size_t p = 0; p < pixels; p++) {
-        const float *px = im.data + (size_t)im.channels * p;
-        if (!pixel_is_valid(px, at)) {
-            err_set(e, "%s: pixel (%zu, %zu) is not finite or has a negative M2 or count", path,
-                    p % (size_t)m.width, p / (size_t)m.width);
-            goto fail;
-        }
-        for (size_t c = 0; c < 3; c++) {
-            m.mean[3 * p + c] = px[at[c]];
-            m.m2[3 * p + c] = px[at[3 + c]];
-            m.m3[3 * p + c] = px[at[6 + c]];
-        }
-        m.n[p] = px[at[9]];
-    }
-    *out = m;
-    if (image != NULL)
-        *image = im;
-    else
-        image_free(&im);
+    free(m->packed.n);
+    memset(&m->packed, 0, sizeof m->packed);
     return true;
-fail:
-    moments_free(&m);
-    image_free(&im);
-    return false;
 }

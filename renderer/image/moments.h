@@ -24,7 +24,30 @@ struct moments {
      * pixel, absolute, in the same direction in all pixels at worst. NULL: not at all. Lives in
      * memory only: no file has it, and moments_merge() refuses it. */
     double *tolerance;
+    /* The same as the floats of a file, half as much memory, where n to m3 are NULL: only for who reads them by
+     * moments_n() to moments_m3(), moments_run() or moments_unpack() (comparisons). */
+    struct {
+        float *n, *mean, *m2, *m3;
+    } packed;
 };
+
+/* Of a pixel; of value 3 pixel + channel. */
+static inline double moments_n(const struct moments *m, size_t pixel)
+{
+    return m->n != NULL ? m->n[pixel] : (double)m->packed.n[pixel];
+}
+static inline double moments_mean(const struct moments *m, size_t i)
+{
+    return m->n != NULL ? m->mean[i] : (double)m->packed.mean[i];
+}
+static inline double moments_m2(const struct moments *m, size_t i)
+{
+    return m->n != NULL ? m->m2[i] : (double)m->packed.m2[i];
+}
+static inline double moments_m3(const struct moments *m, size_t i)
+{
+    return m->n != NULL ? m->m3[i] : (double)m->packed.m3[i];
+}
 
 /* All zero, unit "sample", spp 1. */
 bool moments_alloc(struct moments *m, int width, int height, struct err *e)
@@ -76,5 +99,10 @@ void moments_writer_abandon(struct moments_writer *w);
  * n, n not a whole number, or no pixel. */
 bool moments_read(const char *path, struct moments *out, struct image *image, struct err *e)
     __attribute__((warn_unused_result));
+/* The same, packed. */
+bool moments_read_packed(const char *path, struct moments *out, struct err *e)
+    __attribute__((warn_unused_result));
+/* What is packed as doubles, in place. Fails only out of memory. */
+bool moments_unpack(struct moments *m, struct err *e) __attribute__((warn_unused_result));
 
 #endif
