@@ -143,6 +143,14 @@ struct moments moments_run(const struct moments *m, size_t first, int num)
     return run;
 }
 
+struct moments moments_rows(const struct moments *m, int y, int num)
+{
+    struct moments rows = moments_run(m, (size_t)y * (size_t)m->width, num);
+    rows.width = m->width;
+    rows.height = num;
+    return rows;
+}
+
 double moments_var_of_mean(const struct moments *m, size_t pixel, int channel)
 {
     double n = moments_n(m, pixel);

@@ -67,6 +67,8 @@ bool moments_merge(struct moments *dst, const struct moments *src, struct err *e
     __attribute__((warn_unused_result));
 /* Pixels first .. first+num-1 in the order of their rows, as an image one pixel high for moments_merge(). Owns nothing. */
 struct moments moments_run(const struct moments *m, size_t first, int num);
+/* Rows y .. y+num-1. Owns nothing. */
+struct moments moments_rows(const struct moments *m, int y, int num);
 /* Groups of `k` samples are not kept apart, so the variance of the pixel's mean is M2/(n(n-1));
  * NAN if n < 2 or stratified, 0 if exact. channel 0..2. */
 double moments_var_of_mean(const struct moments *m, size_t pixel, int channel);

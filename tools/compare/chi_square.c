@@ -4,13 +4,7 @@
 
 #include <math.h>
 #include <stdlib.h>
-
-/* A region as the union of smaller ones, each testable. */
-struct part {
-    double sum; /* of their squares */
-    int num;
-    bool whole; /* they cover all of it */
-};
+#include <string.h>
 
 /* The square of a region's excess over its margin, as of a standard normal law. Where the bias is
  * within the margin it is at most what noise alone would give. */
@@ -64,40 +58,67 @@ static void merge(const struct judge *j, const struct pyramid *p, int below, int
     }
 }
 
-/* From level `first` on. `part` has room for the regions of that level twice. */
-static void test(struct judge *j, const struct pyramid *p, int channel, int first,
-                 struct part *part, struct chi_square *d)
+static size_t regions_of(const struct pyramid *p, int level)
 {
-    size_t regions = (size_t)p->level[first].nx * (size_t)p->level[first].ny;
-    struct part *from = part, *to = part + regions;
+    return (size_t)p->level[level].nx * (size_t)p->level[level].ny;
+}
+
+/* Every region of level 0 by itself. */
+static void begin(const struct judge *j, const struct pyramid *p, struct part *part)
+{
+    size_t regions = regions_of(p, 0);
     for (size_t i = 0; i < regions; i++) {
-        struct measured m = region_measure(j, &p->level[first].cell[i], pyramid_rect(p, first, i));
-        from[i] = region_is_normal(j, &m) ? part_of(&m) : (struct part){0};
+        struct measured m = region_measure(j, &p->level[0].cell[i], pyramid_rect(p, 0, i));
+        part[i] = region_is_normal(j, &m) ? part_of(&m) : (struct part){0};
     }
-    for (int l = first, next; (next = next_level(p, l)) >= 0; l = next) {
+}
+
+/* From level 0 to level `last`; the result is where is returned. `part` has room for the regions of level 0 twice. */
+static struct part *merge_up(const struct judge *j, const struct pyramid *p, int last,
+                             struct part *part)
+{
+    struct part *from = part, *to = part + regions_of(p, 0);
+    for (int l = 0, next; l < last && (next = next_level(p, l)) >= 0; l = next) {
         merge(j, p, l, next, from, to);
         struct part *swap = from;
         from = to;
         to = swap;
     }
-    if (from->num < 2) /* one square is what the pyramid tests */
-        return;
-    j->num_tests[STATISTIC_CHI_SQUARE]++;
-    double log10_p = fmax(region_smallest_log10_p, stats_chi2_log10_p(from->sum, from->num));
-    if (log10_p < d->log10_p)
-        *d = (struct chi_square){log10_p, channel, p->level[first].side, from->num};
+    return from;
 }
 
-bool chi_square_scan(struct judge *j, const struct pyramid *p, int channel, struct chi_square *d,
-                     struct err *e)
+bool chi_square_gather(const struct judge *j, const struct pyramid *band, struct part *tiles,
+                       struct err *e)
 {
-    size_t pixels = (size_t)p->width * (size_t)p->height;
-    struct part *part = malloc(2 * pixels * sizeof *part);
+    struct part *part = malloc(2 * regions_of(band, 0) * sizeof *part);
     if (part == NULL)
-        return err_set(e, "out of memory for the regions of %d x %d pixels", p->width, p->height);
-    test(j, p, channel, 0, part, d);
-    if (p->tile_level > 0)
-        test(j, p, channel, p->tile_level, part, d);
+        return err_set(e, "out of memory for the regions of %d x %d pixels", band->width,
+                       band->height);
+    begin(j, band, part);
+    memcpy(tiles, merge_up(j, band, band->tile_level, part),
+           regions_of(band, band->tile_level) * sizeof *tiles);
     free(part);
     return true;
+}
+
+static void test(struct judge *j, const struct pyramid *above, int channel, int side,
+                 struct part *tiles, struct chi_square *d)
+{
+    const struct part *all = merge_up(j, above, above->num_levels - 1, tiles);
+    if (all->num < 2) /* one square is what the pyramid tests */
+        return;
+    j->num_tests[STATISTIC_CHI_SQUARE]++;
+    double log10_p = fmax(region_smallest_log10_p, stats_chi2_log10_p(all->sum, all->num));
+    if (log10_p < d->log10_p)
+        *d = (struct chi_square){log10_p, channel, side, all->num};
+}
+
+void chi_square_test(struct judge *j, const struct pyramid *above, int channel, struct part *tiles,
+                     struct chi_square *d)
+{
+    test(j, above, channel, 1, tiles, d);
+    if (above->level[0].side == 1)
+        return;
+    begin(j, above, tiles);
+    test(j, above, channel, above->level[0].side, tiles, d);
 }

@@ -13,10 +13,20 @@ struct chi_square {
     int regions; /* squares summed */
 };
 
-/* Two tests in this channel: over the finest partition of the image into testable regions, and over
- * one whose regions are reporting tiles or larger. Counts them in j->num_tests. Fails only out of
- * memory. */
-bool chi_square_scan(struct judge *j, const struct pyramid *p, int channel, struct chi_square *d,
-                     struct err *e) __attribute__((warn_unused_result));
+/* A region as the union of smaller ones, each testable. */
+struct part {
+    double sum; /* of their squares */
+    int num;
+    bool whole; /* they cover all of it */
+};
+
+/* The finest partition of a band, as parts of its tiles. Fails only out of memory. */
+bool chi_square_gather(const struct judge *j, const struct pyramid *band, struct part *tiles,
+                       struct err *e) __attribute__((warn_unused_result));
+
+/* Two tests in this channel: over the finest partition of the image into testable regions, of which `tiles` has what was
+ * gathered and room for as many, and over one whose regions are reporting tiles or larger. Counts them in j->num_tests. */
+void chi_square_test(struct judge *j, const struct pyramid *above, int channel, struct part *tiles,
+                     struct chi_square *d);
 
 #endif

@@ -14,6 +14,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 static const double largest_z = 1e4;
 const char *const statistic_name[NUM_STATISTICS] = {"image", "pyramid", "dense", "directed",
@@ -47,79 +48,141 @@ static struct measured measure_in(const struct judge *j, const struct pyramid *p
 struct worst {
     struct cell cell;
     struct rect rect;
-    int channel;
+    int channel, side;
     double log10_p, z;
 };
 
-/* Tests every region of one channel; worst, of the image and of all smaller ones. */
-static void scan(struct judge *j, const struct pyramid *p, int channel, struct worst worst_of[2],
-                 struct comparison *out)
+/* All regions of one channel, from band to band and then what lies above. */
+struct sweep {
+    int channel;
+    struct pyramid above;
+    size_t tested[PYRAMID_LEVELS]; /* of each level of the image */
+    struct worst *worst;           /* of the image and of all smaller ones */
+    struct part *tiles;            /* chi_square.h; room for them twice */
+    double squared;                /* squared_bias() */
+};
+
+/* Beyond that z the smallest log10 p is all that is known. */
+static const double largest_rank = 2146;
+
+/* Tests every region of a level, whose first row is row y of the image, as the image's level `number`. */
+static void scan(const struct judge *j, const struct pyramid *p, int l, int y, int number,
+                 struct sweep *s)
 {
-    for (int l = p->num_levels - 1; l >= 0; l--) {
-        const struct pyramid_level *level = &p->level[l];
-        size_t regions = (size_t)level->nx * (size_t)level->ny, tested = 0;
-        for (size_t i = 0; i < regions; i++) {
+    const struct pyramid_level *level = &p->level[l];
+    size_t regions = (size_t)level->nx * (size_t)level->ny;
+    for (size_t i = 0; i < regions; i++) {
+        struct measured m = measure_in(j, p, l, i);
+        if (!region_testable(j, &m))
+            continue;
+        s->tested[number]++;
+        /* An exact p only for what may be the smallest: regions without noise on a side and those
+         * whose normal equivalent, good to 3 %, comes near the largest. */
+        struct worst *worst = &s->worst[m.statistic];
+        bool is_ranked = !m.noise_free && !m.silent;
+        double z = is_ranked ? region_rank(j, &m) : INFINITY;
+        if (is_ranked && (z <= 0 || z < 0.94 * worst->z))
+            continue;
+        double log10_p = region_log10_p(j, &m, s->channel);
+        /* Of equal ones the larger region counts. */
+        if (log10_p < worst->log10_p ||
+            (log10_p == worst->log10_p && s->channel == worst->channel &&
+             level->side > worst->side)) {
             struct rect r = pyramid_rect(p, l, i);
-            struct measured m = measure_in(j, p, l, i);
-            if (!region_testable(j, &m))
-                continue;
-            tested++;
-            /* An exact p only for what may be the smallest: regions without noise on a side and those
-             * whose normal equivalent, good to 3 %, comes near the largest. */
-            struct worst *worst = &worst_of[m.statistic];
-            bool is_ranked = !m.noise_free && !m.silent;
-            double z = is_ranked ? region_rank(j, &m) : INFINITY;
-            if (is_ranked && (z <= 0 || z < 0.94 * worst->z))
-                continue;
-            double log10_p = region_log10_p(j, &m, channel);
-            if (log10_p < worst->log10_p) {
-                *worst = (struct worst){level->cell[i], r, channel, log10_p,
-                                        is_ranked ? fmax(z, worst->z) : worst->z};
-            }
+            r.y += y;
+            *worst = (struct worst){
+                level->cell[i], r,
+                s->channel,     level->side,
+                log10_p,        is_ranked ? fmin(largest_rank, fmax(z, worst->z)) : worst->z};
         }
-        j->num_tests[l == p->num_levels - 1 ? STATISTIC_IMAGE : STATISTIC_PYRAMID] += tested;
-        if (l >= p->tile_level && tested < regions)
-            out->skew_limited = true;
-        if (channel == CHANNEL_LUMINANCE && 2 * tested >= regions)
-            out->finest_side = level->side;
     }
 }
 
 /* sum over pixels of d^2 - v: without bias for the sum of squared biases. */
-static double squared_bias(const struct pyramid *p)
+static void add_squared_bias(const struct pyramid *p, double *sum)
 {
-    double sum = 0;
     size_t pixels = (size_t)p->width * (size_t)p->height;
     const struct cell *cell = p->level[0].cell;
     for (size_t i = 0; i < pixels; i++) {
         double d = cell[i].a - cell[i].b;
-        sum += d * d - cell[i].va - cell[i].vb;
+        *sum += d * d - cell[i].va - cell[i].vb;
     }
-    return sum;
 }
 
-static bool fill_images(const struct judge *j, const struct pyramid *p, struct comparison *out,
-                        struct err *e)
+static void fill_images(const struct judge *j, const struct pyramid *p, size_t first,
+                        struct comparison *out)
 {
-    if (!image_alloc(&out->z, p->width, p->height, 1, (const char *const[]){"z"}, e) ||
-        !image_alloc(&out->relative, p->width, p->height, 1, (const char *const[]){"rel"}, e))
-        return false;
     size_t pixels = (size_t)p->width * (size_t)p->height;
     for (size_t i = 0; i < pixels; i++) {
         struct measured m = region_measure(j, &p->level[0].cell[i], pyramid_rect(p, 0, i));
-        out->z.data[i] = (float)fmin(largest_z, fmax(-largest_z, region_t(&m)));
-        out->relative.data[i] = (float)(m.d / m.unit);
+        out->z.data[first + i] = (float)fmin(largest_z, fmax(-largest_z, region_t(&m)));
+        out->relative.data[first + i] = (float)(m.d / m.unit);
     }
+}
+
+/* Everything that is smaller than a tile, of all rows from y on that a and b have. */
+static bool sweep_band(const struct judge *j, const struct moments *a, const struct moments *b,
+                       int y, struct sweep *s, struct comparison *out, struct err *e)
+{
+    struct pyramid p;
+    if (!pyramid_build(a, b, s->channel, j->opt.tile, &p, e))
+        return false;
+    bool ok = true;
+    for (int l = p.tile_level - 1; l >= 0; l--)
+        scan(j, &p, l, y, l, s);
+    const struct pyramid_level *tile = &p.level[p.tile_level];
+    size_t first = (size_t)(y / tile->side) * (size_t)tile->nx;
+    memcpy(s->above.level[0].cell + first, tile->cell,
+           (size_t)tile->nx * (size_t)tile->ny * sizeof *tile->cell);
+    if (s->channel == CHANNEL_LUMINANCE) {
+        fill_images(j, &p, (size_t)y * (size_t)p.width, out);
+    } else {
+        add_squared_bias(&p, &s->squared);
+        if (j->share[STATISTIC_CHI_SQUARE] > 0)
+            ok = chi_square_gather(j, &p, s->tiles + first, e);
+    }
+    pyramid_free(&p);
+    return ok;
+}
+
+/* All of a channel. `levels` are the image's. */
+static bool sweep_channel(struct judge *j, const struct moments *a, const struct moments *b,
+                          const struct pyramid *levels, struct sweep *s, struct chi_square *dense,
+                          struct comparison *out, struct err *e)
+{
+    const int band = pyramid_band(levels), bands = j->height / band > 0 ? j->height / band : 1;
+    memset(s->tested, 0, sizeof s->tested);
+    s->squared = 0;
+    for (int k = 0, y = 0; k < bands; k++, y += band) {
+        const int rows = k + 1 < bands ? band : j->height - y;
+        const struct moments part[2] = {moments_rows(a, y, rows), moments_rows(b, y, rows)};
+        if (!sweep_band(j, &part[0], &part[1], y, s, out, e))
+            return false;
+    }
+    pyramid_sum_up(&s->above);
+    for (int l = s->above.num_levels - 1; l >= 0; l--)
+        scan(j, &s->above, l, 0, levels->tile_level + l, s);
+    for (int l = levels->num_levels - 1; l >= 0; l--) {
+        const struct pyramid_level *level = &levels->level[l];
+        size_t regions = (size_t)level->nx * (size_t)level->ny, tested = s->tested[l];
+        j->num_tests[l == levels->num_levels - 1 ? STATISTIC_IMAGE : STATISTIC_PYRAMID] += tested;
+        if (l >= levels->tile_level && tested < regions)
+            out->skew_limited = true;
+        if (s->channel == CHANNEL_LUMINANCE && 2 * tested >= regions)
+            out->finest_side = level->side;
+    }
+    if (s->channel < CHANNEL_LUMINANCE && j->share[STATISTIC_CHI_SQUARE] > 0)
+        chi_square_test(j, &s->above, s->channel, s->tiles, dense);
     return true;
 }
 
 /* The region's own MDB or, if it is too skewed to be tested, that of the smallest tested region
  * around it: there the same error is diluted. */
-static double mdb_of(const struct judge *j, const struct pyramid *p, int level, size_t i)
+static double mdb_of(const struct judge *j, const struct pyramid *p, size_t i)
 {
-    struct measured own = region_measure(j, &p->level[level].cell[i], pyramid_rect(p, level, i));
-    for (int l = level; l < p->num_levels; l++) {
-        size_t at = pyramid_parent(p, level, l, i);
+    struct measured own = region_measure(j, &p->level[0].cell[i], pyramid_rect(p, 0, i));
+    for (int l = 0; l < p->num_levels; l++) {
+        size_t at = pyramid_parent(p, 0, l, i);
         struct measured m = measure_in(j, p, l, at);
         if (region_testable(j, &m))
             return fmin(region_mdb_none, region_mdb(j, &m, CHANNEL_LUMINANCE) * m.unit / own.unit);
@@ -130,7 +193,7 @@ static double mdb_of(const struct judge *j, const struct pyramid *p, int level, 
 static bool fill_tiles(const struct judge *j, const struct pyramid *p, struct comparison *out,
                        struct region **tiles, struct err *e)
 {
-    const struct pyramid_level *level = &p->level[p->tile_level];
+    const struct pyramid_level *level = &p->level[0];
     size_t num = (size_t)level->nx * (size_t)level->ny;
     out->tiles_x = level->nx;
     out->tiles_y = level->ny;
@@ -140,11 +203,11 @@ static bool fill_tiles(const struct judge *j, const struct pyramid *p, struct co
     if (*tiles == NULL || out->tile_log10_p == NULL || out->tile_t == NULL)
         return err_set(e, "out of memory for %zu tiles", num);
     for (size_t i = 0; i < num; i++) {
-        struct rect r = pyramid_rect(p, p->tile_level, i);
+        struct rect r = pyramid_rect(p, 0, i);
         struct measured m = region_measure(j, &level->cell[i], r);
         struct region *tile = &(*tiles)[i];
         *tile = region_fill(j, &level->cell[i], r, CHANNEL_LUMINANCE);
-        tile->mdb = mdb_of(j, p, p->tile_level, i);
+        tile->mdb = mdb_of(j, p, i);
         out->mdb_tile = fmax(out->mdb_tile, tile->mdb);
         out->tile_t[i] = tile->t;
         out->tile_log10_p[i] = region_log10_p_equal(j, &m, CHANNEL_LUMINANCE);
@@ -214,9 +277,9 @@ bool compare_moments(const struct moments *a, const struct moments *b,
 {
     *out = (struct comparison){0};
     struct judge j;
-    struct pyramid p = {0};
     struct region *tiles = NULL;
     struct worst worst[2] = {{.log10_p = 1}, {.log10_p = 1}};
+    struct sweep s = {.worst = worst};
     struct cell image[NUM_CHANNELS];
     struct chi_square dense = {0};
     double squared = 0, mean = 0, directed, noise;
@@ -224,24 +287,30 @@ bool compare_moments(const struct moments *a, const struct moments *b,
     if (!input_checks_run(a, b, opt, &j, e))
         return false;
     struct rect whole = {0, 0, a->width, a->height};
-    for (int c = 0; c < NUM_CHANNELS; c++) {
-        pyramid_free(&p);
-        if (!pyramid_build(a, b, c, opt->tile, &p, e))
+    const struct pyramid levels = pyramid_levels(a->width, a->height, opt->tile);
+    const struct pyramid_level *tile = &levels.level[levels.tile_level];
+    set_guards(&j, pyramid_regions(&levels));
+    s.tiles = malloc(2 * (size_t)tile->nx * (size_t)tile->ny * sizeof *s.tiles);
+    if (s.tiles == NULL) {
+        err_set(e, "out of memory for the tiles of %d x %d pixels", a->width, a->height);
+        goto fail;
+    }
+    if (!image_alloc(&out->z, a->width, a->height, 1, (const char *const[]){"z"}, e) ||
+        !image_alloc(&out->relative, a->width, a->height, 1, (const char *const[]){"rel"}, e))
+        goto fail;
+    for (s.channel = 0; s.channel < NUM_CHANNELS; s.channel++) {
+        pyramid_free(&s.above);
+        if (!pyramid_above(&levels, &s.above, e) ||
+            !sweep_channel(&j, a, b, &levels, &s, &dense, out, e))
             goto fail;
-        if (c == 0)
-            set_guards(&j, pyramid_regions(&p));
-        image[c] = p.level[p.num_levels - 1].cell[0];
-        scan(&j, &p, c, worst, out);
-        if (c < CHANNEL_LUMINANCE && j.share[STATISTIC_CHI_SQUARE] > 0 &&
-            !chi_square_scan(&j, &p, c, &dense, e))
-            goto fail;
-        if (c < CHANNEL_LUMINANCE)
-            squared += luminance_weight[c] * squared_bias(&p);
+        image[s.channel] = s.above.level[s.above.num_levels - 1].cell[0];
+        if (s.channel < CHANNEL_LUMINANCE)
+            squared += luminance_weight[s.channel] * s.squared;
     }
     if (!test_rest(a, b, &j, &like, &directed, &noise, out, e))
         goto fail;
     fill_statistics(&j, worst, &dense, like, directed, noise, out);
-    if (!fill_images(&j, &p, out, e) || !fill_tiles(&j, &p, out, &tiles, e))
+    if (!fill_tiles(&j, &s.above, out, &tiles, e))
         goto fail;
     mean = image[CHANNEL_LUMINANCE].b;
     out->rms_bias = sqrt(fmax(0, squared) * whole.width * whole.height) / mean;
@@ -263,12 +332,14 @@ bool compare_moments(const struct moments *a, const struct moments *b,
     }
     verdict_decide(out, opt, tiles);
     free(tiles);
-    pyramid_free(&p);
+    free(s.tiles);
+    pyramid_free(&s.above);
     return true;
 
 fail:
     free(tiles);
-    pyramid_free(&p);
+    free(s.tiles);
+    pyramid_free(&s.above);
     comparison_free(out);
     return false;
 }

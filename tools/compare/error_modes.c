@@ -1,5 +1,7 @@
 #include "error_modes.h"
 
+#include "pyramid.h"
+
 #include <assert.h>
 #include <math.h>
 #include <stdlib.h>
@@ -29,101 +31,216 @@ bool error_mode_has_amount(enum error_mode_kind kind)
     return kind <= ERROR_SHIFT_Y;
 }
 
-static void fill_side(const struct moments *m, double *sd, double *root)
+static double larger(double a, double b)
 {
-    bool exact = strcmp(m->unit, "exact") == 0;
-    size_t pixels = (size_t)m->width * (size_t)m->height;
-    for (size_t p = 0; p < pixels; p++) {
-        double n = m->n[p], v = exact ? 0 : 1 / (n * (n - 1)), k = exact ? 0 : v / (n - 2);
-        for (size_t i = 3 * p; i < 3 * p + 3; i++) {
-            sd[i] = sqrt(m->m2[i] * v);
-            root[i] = cbrt(m->m3[i] * k);
-        }
-    }
+    return a > b ? a : b;
 }
 
-/* out = mean of f(in) over the (2 reach + 1)^2 pixels around each that lie in the image, without the
- * pixel itself; f is the square or nothing. `row` has room for one image. */
-static void around(int width, int height, const double *in, bool square, int reach, double *row,
-                   double *out)
+size_t error_modes_at(const struct error_modes_frame *f, int x, int y)
 {
-    size_t stride = 3 * (size_t)width;
-    for (int y = 0; y < height; y++)
-        for (int x = 0; x < width; x++) {
-            int lo = x < reach ? 0 : x - reach, hi = x + reach < width ? x + reach : width - 1;
-            double sum[3] = {0};
-            for (int k = lo; k <= hi; k++)
-                for (int c = 0; c < 3; c++) {
-                    double v = in[(size_t)y * stride + 3 * (size_t)k + (size_t)c];
-                    sum[c] += square ? v * v : v;
-                }
-            memcpy(&row[(size_t)y * stride + 3 * (size_t)x], sum, sizeof sum);
-        }
-    for (int y = 0; y < height; y++) {
-        int lo = y < reach ? 0 : y - reach, hi = y + reach < height ? y + reach : height - 1;
-        for (int x = 0; x < width; x++) {
-            int x_lo = x < reach ? 0 : x - reach, x_hi = x + reach < width ? x + reach : width - 1;
-            double others = (double)(hi - lo + 1) * (x_hi - x_lo + 1) - 1;
-            size_t i = (size_t)y * stride + 3 * (size_t)x;
+    return (size_t)(y - f->y) * (size_t)f->across + (size_t)(x - f->x);
+}
+
+/* The part of the image that reaches so much further. */
+static struct rect grown(const struct error_modes *modes, struct rect r, int by)
+{
+    int x = r.x > by ? r.x - by : 0, y = r.y > by ? r.y - by : 0;
+    int right = r.x + r.width + by, below = r.y + r.height + by;
+    return (struct rect){x, y, (right < modes->width ? right : modes->width) - x,
+                         (below < modes->height ? below : modes->height) - y};
+}
+
+static void fill_side(const struct error_modes *modes, struct error_modes_frame *f, int side)
+{
+    const struct moments *m = modes->side[side];
+    const bool exact = strcmp(m->unit, "exact") == 0;
+    const size_t across = (size_t)f->across, room = f->room;
+    for (int y = f->y; y < f->y + f->down; y++) {
+        const size_t to = error_modes_at(f, f->x, y),
+                     from = (size_t)y * (size_t)modes->width + (size_t)f->x;
+        double *sd = f->sd[side] + to, *mean = f->mean[side] + to;
+        for (size_t x = 0; x < across; x++) {
+            double n = moments_n(m, from + x), v = exact ? 0 : 1 / (n * (n - 1));
+            f->n[side][to + x] = n;
             for (size_t c = 0; c < 3; c++) {
-                double own = square ? in[i + c] * in[i + c] : in[i + c], sum = -own;
-                for (int k = lo; k <= hi; k++)
-                    sum += row[(size_t)k * stride + 3 * (size_t)x + c];
-                out[i + c] = fmax(0, sum) / others;
+                mean[c * room + x] = moments_mean(m, 3 * (from + x) + c);
+                sd[c * room + x] = moments_m2(m, 3 * (from + x) + c) * v;
             }
         }
+        for (size_t c = 0; c < 3; c++)
+            for (size_t x = 0; x < across; x++)
+                sd[c * room + x] = sqrt(sd[c * room + x]);
     }
 }
 
-bool error_modes_base_build(const struct moments *a, const struct moments *b,
-                            struct error_modes_base *out, struct err *e)
+static void fill_root(const struct error_modes *modes, struct error_modes_frame *f, int side,
+                      struct rect r)
 {
-    size_t n = 3 * (size_t)a->width * (size_t)a->height;
-    assert(n > 3);
-    *out = (struct error_modes_base){.width = a->width, .height = a->height, .a = a, .b = b};
-    double **const part[] = {&out->sd[0],      &out->sd[1],     &out->root[0], &out->root[1],
-                             &out->around[0],  &out->around[1], &out->weight,  &out->mix,
-                             &out->mix_around, &out->b_around};
+    const struct moments *m = modes->side[side];
+    const bool exact = strcmp(m->unit, "exact") == 0;
+    for (int y = r.y; y < r.y + r.height; y++)
+        for (int x = r.x; x < r.x + r.width; x++) {
+            size_t to = error_modes_at(f, x, y),
+                   from = (size_t)y * (size_t)modes->width + (size_t)x;
+            double n = f->n[side][to], v = exact ? 0 : 1 / (n * (n - 1)),
+                   k = exact ? 0 : v / (n - 2);
+            for (size_t c = 0; c < 3; c++)
+                f->root[side][to + c * f->room] = cbrt(moments_m3(m, 3 * from + c) * k);
+        }
+}
+
+/* One plane: out = mean of f(in) over the (2 reach + 1)^2 pixels around each of r that lie in the image, without the
+ * pixel itself; f is the square or nothing. */
+static void around(const struct error_modes *modes, const struct error_modes_frame *f,
+                   struct rect r, const double *in, bool square, int reach, double *out)
+{
+    const struct rect from = grown(modes, r, reach);
+    for (int y = from.y; y < from.y + from.height; y++)
+        for (int k = -reach; k <= reach; k++) {
+            const int first = r.x + k > 0 ? r.x : -k;
+            const int end = r.x + r.width + k < modes->width ? r.x + r.width : modes->width - k;
+            double *row = f->row + error_modes_at(f, first, y);
+            const double *v = in + error_modes_at(f, first, y) + k;
+            if (k == -reach)
+                memset(f->row + error_modes_at(f, r.x, y), 0, (size_t)r.width * sizeof *row);
+            for (int x = 0; x < end - first; x++)
+                row[x] += square ? v[x] * v[x] : v[x];
+        }
+    for (int y = r.y; y < r.y + r.height; y++) {
+        const size_t at = error_modes_at(f, r.x, y);
+        const int lo = y < reach ? 0 : y - reach;
+        const int hi = y + reach < modes->height ? y + reach : modes->height - 1;
+        for (int x = 0; x < r.width; x++)
+            out[at + (size_t)x] =
+                square ? -(in[at + (size_t)x] * in[at + (size_t)x]) : -in[at + (size_t)x];
+        for (int k = lo; k <= hi; k++) {
+            const double *row = f->row + error_modes_at(f, r.x, k);
+            for (int x = 0; x < r.width; x++)
+                out[at + (size_t)x] += row[x];
+        }
+        for (int x = r.x; x < r.x + r.width; x++) {
+            int x_lo = x < reach ? 0 : x - reach;
+            int x_hi = x + reach < modes->width ? x + reach : modes->width - 1;
+            double others = (double)(hi - lo + 1) * (x_hi - x_lo + 1) - 1;
+            double *o = &out[at + (size_t)(x - r.x)];
+            *o = larger(0, *o) / others;
+        }
+    }
+}
+
+/* Moves the frame to the pixels r of the image and computes what is asked of them. */
+enum depth { VARIANCES, WEIGHTS, ALL };
+static void move_frame(const struct error_modes *modes, struct error_modes_frame *f, struct rect r,
+                       enum depth depth)
+{
+    const struct rect near = grown(modes, r, depth == ALL ? 1 : 0), whole = grown(modes, near, 2);
+    f->x = whole.x;
+    f->y = whole.y;
+    f->across = whole.width;
+    f->down = whole.height;
+    for (int s = 0; s < 2; s++) {
+        fill_side(modes, f, s);
+        for (size_t c = 0; c < 3 * f->room; c += f->room)
+            around(modes, f, near, f->sd[s] + c, true, 2, f->around[s] + c);
+    }
+    for (size_t c = 0; depth != VARIANCES && c < 3; c++)
+        for (int y = near.y; y < near.y + near.height; y++) {
+            const size_t at = c * f->room + error_modes_at(f, near.x, y);
+            const double *va = f->around[0] + at, *vb = f->around[1] + at, *a = f->mean[0] + at,
+                         *b = f->mean[1] + at, least = modes->least[c];
+            for (int x = 0; x < near.width; x++) {
+                double share = va[x] + vb[x] > 0 ? vb[x] / (va[x] + vb[x]) : 0.5;
+                f->mix[at + (size_t)x] = b[x] + share * (a[x] - b[x]);
+                f->weight[at + (size_t)x] = least > 0 ? 1 / larger(va[x] + vb[x], least) : 0;
+            }
+        }
+    if (depth != ALL)
+        return;
+    fill_root(modes, f, 0, r);
+    fill_root(modes, f, 1, r);
+    for (size_t c = 0; c < 3 * f->room; c += f->room) {
+        around(modes, f, r, f->mix + c, false, 1, f->mix_around + c);
+        around(modes, f, r, f->mean[1] + c, false, 1, f->b_around + c);
+    }
+}
+
+static bool alloc_frame(struct error_modes_frame *f, size_t room)
+{
+    double **const part[] = {&f->mean[0], &f->mean[1], &f->sd[0],      &f->sd[1],
+                             &f->root[0], &f->root[1], &f->around[0],  &f->around[1],
+                             &f->weight,  &f->mix,     &f->mix_around, &f->b_around};
     size_t num = sizeof part / sizeof *part;
-    out->data = malloc((num + 1) * n * sizeof *out->data);
-    if (out->data == NULL)
+    f->room = room;
+    f->data = malloc((3 * num + 3) * room * sizeof *f->data);
+    for (size_t i = 0; f->data != NULL && i < num; i++)
+        *part[i] = f->data + 3 * i * room;
+    f->n[0] = f->data + 3 * num * room;
+    f->n[1] = f->n[0] + room;
+    f->row = f->n[1] + room;
+    return f->data != NULL;
+}
+
+/* 3 % of the mean of the variances around all pixels. */
+static void find_least(struct error_modes *modes)
+{
+    const double n = 3 * (double)modes->width * modes->height;
+    const size_t room = modes->own.room;
+    double mean[3] = {0};
+    for (int y = 0; y < modes->height; y += ERROR_MODES_BAND) {
+        const int left = modes->height - y,
+                  rows = left < ERROR_MODES_BAND ? left : ERROR_MODES_BAND;
+        move_frame(modes, &modes->own, (struct rect){0, y, modes->width, rows}, VARIANCES);
+        const size_t at = error_modes_at(&modes->own, 0, y),
+                     end = at + (size_t)rows * (size_t)modes->width;
+        for (size_t i = at; i < end; i++)
+            for (size_t c = 0; c < 3; c++)
+                mean[c] +=
+                    3 * (modes->own.around[0][c * room + i] + modes->own.around[1][c * room + i]) /
+                    n;
+    }
+    for (int c = 0; c < 3; c++)
+        modes->least[c] = smallest_variance * mean[c];
+}
+
+bool error_modes_open(const struct moments *a, const struct moments *b, struct error_modes *out,
+                      struct err *e)
+{
+    const int halo = 3, rows = a->height < ERROR_MODES_BAND ? a->height : ERROR_MODES_BAND;
+    assert(a->width > 1 || a->height > 1);
+    *out = (struct error_modes){{a, b}, .width = a->width, .height = a->height};
+    const size_t room = (size_t)a->width * (size_t)(rows + 2 * halo);
+    if (!alloc_frame(&out->own, room) || !alloc_frame(&out->turned, room) ||
+        (a->width == a->height && !alloc_frame(&out->columns, room))) {
+        error_modes_free(out);
         return err_set(e, "out of memory for the directions of %d x %d pixels", a->width,
                        a->height);
-    for (size_t i = 0; i < num; i++)
-        *part[i] = out->data + i * n;
-    double *row = out->data + num * n;
-    const struct moments *side[2] = {a, b};
-    for (int s = 0; s < 2; s++) {
-        fill_side(side[s], out->sd[s], out->root[s]);
-        around(a->width, a->height, out->sd[s], true, 2, row, out->around[s]);
     }
-    double mean[3] = {0};
-    for (size_t i = 0; i < n; i++) {
-        double va = out->around[0][i], vb = out->around[1][i];
-        double share = va + vb > 0 ? vb / (va + vb) : 0.5;
-        out->weight[i] = va + vb;
-        out->mix[i] = b->mean[i] + share * (a->mean[i] - b->mean[i]);
-        mean[i % 3] += 3 * (va + vb) / (double)n;
-    }
-    for (size_t i = 0; i < n; i++)
-        out->weight[i] =
-            mean[i % 3] > 0 ? 1 / fmax(out->weight[i], smallest_variance * mean[i % 3]) : 0;
-    around(a->width, a->height, out->mix, false, 1, row, out->mix_around);
-    around(a->width, a->height, b->mean, false, 1, row, out->b_around);
+    find_least(out);
     return true;
 }
 
-void error_modes_base_free(struct error_modes_base *base)
+void error_modes_free(struct error_modes *modes)
 {
-    free(base->data);
-    *base = (struct error_modes_base){0};
+    free(modes->own.data);
+    free(modes->turned.data);
+    free(modes->columns.data);
+    *modes = (struct error_modes){0};
 }
 
-bool error_mode_applies(const struct error_modes_base *base, enum error_mode_kind kind)
+void error_modes_go_to(struct error_modes *modes, int y, int rows)
+{
+    const int w = modes->width, h = modes->height;
+    move_frame(modes, &modes->own, (struct rect){0, y, w, rows}, ALL);
+    move_frame(modes, &modes->turned, (struct rect){0, h - y - rows, w, rows}, WEIGHTS);
+    if (w == h)
+        move_frame(modes, &modes->columns, (struct rect){y, 0, rows, h}, WEIGHTS);
+}
+
+bool error_mode_applies(const struct error_modes *modes, enum error_mode_kind kind)
 {
     if (kind == ERROR_SHIFT_X || kind == ERROR_SHIFT_Y)
-        return base->width > 2 && base->height > 2;
-    return kind != ERROR_TRANSPOSE || base->width == base->height;
+        return modes->width > 2 && modes->height > 2;
+    return kind != ERROR_TRANSPOSE || modes->width == modes->height;
 }
 
 static double power(double x)
@@ -133,89 +250,122 @@ static double power(double x)
 
 static double over(double x)
 {
-    return fmin(x, 1) - x;
+    return (x < 1 ? x : 1) - x;
 }
 
-static size_t at(const struct error_modes_base *base, int x, int y)
+/* Minus the central difference, from the rows (or, down, columns) beside that of the pixel. */
+static void shift(const struct error_modes *modes, bool down, int y, double *const out[3])
 {
-    return 3 * ((size_t)y * (size_t)base->width + (size_t)x);
-}
-
-/* Minus the central difference in row y, per pixel to the right (or, transposed, down). */
-static void slope(const struct error_modes_base *base, int x, int y, bool down, double out[3])
-{
-    size_t lo = down ? at(base, x, y - 1) : at(base, x - 1, y);
-    size_t hi = down ? at(base, x, y + 1) : at(base, x + 1, y);
-    for (size_t c = 0; c < 3; c++)
-        out[c] = -(base->mix[hi + c] - base->mix[lo + c]) / 2;
-}
-
-/* From the rows (columns) beside that of the pixel. */
-static void shift(const struct error_modes_base *base, bool down, int x, int y,
-                  struct error_change *out)
-{
-    double left[3], right[3];
-    if (x < 1 || y < 1 || x >= base->width - 1 || y >= base->height - 1)
-        return;
-    slope(base, down ? x - 1 : x, down ? y : y - 1, down, left);
-    slope(base, down ? x + 1 : x, down ? y : y + 1, down, right);
-    for (int c = 0; c < 3; c++)
-        out->d[c] = (left[c] + right[c]) / 2;
-}
-
-/* B of channel from[c] around the pixel (or, moved, of another pixel) less B around it. */
-static void exchange(const struct error_modes_base *base, size_t own, size_t other,
-                     const int from[3], struct error_change *out)
-{
-    const struct error_modes_base *s = base;
-    bool moved = own != other;
-    double to_other = 0, to_own = 0, near = 0;
+    const struct error_modes_frame *f = &modes->own;
+    const int last = modes->width - 1;
     for (size_t c = 0; c < 3; c++) {
-        size_t k = (size_t)from[c];
-        double there = moved ? s->b->mean[other + c] : s->b_around[own + k];
-        out->d[c] = there - s->b_around[own + c];
-        to_other += s->sd[1][own + c] * s->sd[1][other + c] * s->weight[own + c];
-        to_own += s->sd[1][own + c] * s->sd[1][other + c] * s->weight[other + c];
-        near += (s->around[1][own + c] + (moved ? 0 : s->around[1][own + k])) * s->weight[own + c];
+        memset(out[c], 0, (size_t)modes->width * sizeof *out[c]);
+        if (y < 1 || y >= modes->height - 1)
+            continue;
+        const double *above = f->mix + c * f->room + error_modes_at(f, 0, y - 1),
+                     *below = f->mix + c * f->room + error_modes_at(f, 0, y + 1);
+        for (int x = 1; x < last; x++) {
+            double left = -((down ? below[x - 1] : above[x + 1]) - above[x - 1]) / 2;
+            double right = -(below[x + 1] - (down ? above[x + 1] : below[x - 1])) / 2;
+            out[c][x] = (left + right) / 2;
+        }
     }
-    out->coupled = (moved ? to_other * to_own : 0) + near * near / 8;
 }
 
-struct error_change error_mode_at(const struct error_modes_base *base, enum error_mode_kind kind,
-                                  int x, int y)
+/* B of channel from[c] around the pixel less B around it. */
+static void swap(const struct error_modes *modes, const int from[3], int y,
+                 const struct error_change *out)
 {
-    struct error_change out = {0};
-    static const int same[3] = {0, 1, 2};
-    int w = base->width, h = base->height;
-    size_t own = at(base, x, y), other;
-    const double *near = base->mix_around + own;
-    switch (kind) {
-    case ERROR_SCALE: memcpy(out.d, near, sizeof out.d); return out;
-    case ERROR_OFFSET:
-        for (int c = 0; c < 3; c++)
-            out.d[c] = 1;
-        return out;
-    case ERROR_GAMMA:
-        for (int c = 0; c < 3; c++)
-            out.d[c] = power(near[c]);
-        return out;
-    case ERROR_CLAMP:
-        for (int c = 0; c < 3; c++)
-            out.d[c] = over(near[c]);
-        return out;
-    case ERROR_SHIFT_X:
-    case ERROR_SHIFT_Y: shift(base, kind == ERROR_SHIFT_Y, x, y, &out); return out;
-    case ERROR_SWAP_RB: exchange(base, own, own, (int[3]){2, 1, 0}, &out); return out;
-    case ERROR_SWAP_RG: exchange(base, own, own, (int[3]){1, 0, 2}, &out); return out;
-    case ERROR_SWAP_GB: exchange(base, own, own, (int[3]){0, 2, 1}, &out); return out;
-    case ERROR_FLIP_X: other = at(base, w - 1 - x, y); break;
-    case ERROR_FLIP_Y: other = at(base, x, h - 1 - y); break;
-    case ERROR_ROTATE: other = at(base, w - 1 - x, h - 1 - y); break;
-    case ERROR_TRANSPOSE: other = at(base, y, x); break;
-    case NUM_ERROR_MODES:
-    default: assert(!"no direction"); return out;
+    const struct error_modes_frame *f = &modes->own;
+    const size_t at = error_modes_at(f, 0, y), room = f->room;
+    for (size_t x = 0; x < (size_t)modes->width; x++) {
+        double near = 0;
+        for (size_t c = 0; c < 3; c++) {
+            size_t i = c * room + at + x, k = (size_t)from[c] * room + at + x;
+            out->d[c][x] = f->b_around[k] - f->b_around[i];
+            near += (f->around[1][i] + f->around[1][k]) * f->weight[i];
+        }
+        out->coupled[x] = near * near / 8;
     }
-    if (other != own)
-        exchange(base, own, other, same, &out);
-    return out;
+}
+
+/* B of another pixel less B around its own. That of column 0 is number `other` of frame g, the next `step` further on. */
+static void move(const struct error_modes *modes, const struct error_modes_frame *g, size_t other,
+                 ptrdiff_t step, int y, const struct error_change *out)
+{
+    const struct error_modes_frame *f = &modes->own;
+    const double *b = g->mean[1] + other, *sd = g->sd[1] + other, *weight = g->weight + other;
+    for (size_t x = 0, i = error_modes_at(f, 0, y); x < (size_t)modes->width; x++, i++) {
+        const ptrdiff_t k = (ptrdiff_t)x * step;
+        double to_other = 0, to_own = 0, near = 0;
+        for (size_t c = 0; c < 3; c++) {
+            const size_t own = c * f->room + i;
+            const ptrdiff_t o = (ptrdiff_t)(c * g->room) + k;
+            out->d[c][x] = b[o] - f->b_around[own];
+            to_other += f->sd[1][own] * sd[o] * f->weight[own];
+            to_own += f->sd[1][own] * sd[o] * weight[o];
+            near += f->around[1][own] * f->weight[own];
+        }
+        out->coupled[x] = to_other * to_own + near * near / 8;
+    }
+}
+
+/* A pixel that stays where it is, is not changed. */
+static void stay(int x, const struct error_change *out)
+{
+    out->d[0][x] = out->d[1][x] = out->d[2][x] = out->coupled[x] = 0;
+}
+
+void error_mode_row(const struct error_modes *modes, enum error_mode_kind kind, int y,
+                    const struct error_change *out)
+{
+    const struct error_modes_frame *own = &modes->own, *turned = &modes->turned,
+                                   *columns = &modes->columns;
+    const int w = modes->width, other = modes->height - 1 - y;
+    const size_t size = (size_t)w;
+    const bool centre = w % 2 == 1;
+    memset(out->coupled, 0, size * sizeof *out->coupled);
+    for (size_t c = 0; c < 3; c++) {
+        const double *near = own->mix_around + c * own->room + error_modes_at(own, 0, y);
+        for (size_t x = 0; kind == ERROR_SCALE && x < size; x++)
+            out->d[c][x] = near[x];
+        for (size_t x = 0; kind == ERROR_OFFSET && x < size; x++)
+            out->d[c][x] = 1;
+        for (size_t x = 0; kind == ERROR_GAMMA && x < size; x++)
+            out->d[c][x] = power(near[x]);
+        for (size_t x = 0; kind == ERROR_CLAMP && x < size; x++)
+            out->d[c][x] = over(near[x]);
+    }
+    switch (kind) {
+    case ERROR_SCALE:
+    case ERROR_OFFSET:
+    case ERROR_GAMMA:
+    case ERROR_CLAMP: return;
+    case ERROR_SHIFT_X:
+    case ERROR_SHIFT_Y: shift(modes, kind == ERROR_SHIFT_Y, y, out->d); return;
+    case ERROR_SWAP_RB: swap(modes, (int[3]){2, 1, 0}, y, out); return;
+    case ERROR_SWAP_RG: swap(modes, (int[3]){1, 0, 2}, y, out); return;
+    case ERROR_SWAP_GB: swap(modes, (int[3]){0, 2, 1}, y, out); return;
+    case ERROR_FLIP_X:
+        move(modes, own, error_modes_at(own, w - 1, y), -1, y, out);
+        if (centre)
+            stay(w / 2, out);
+        return;
+    case ERROR_FLIP_Y:
+        move(modes, turned, error_modes_at(turned, 0, other), 1, y, out);
+        for (int x = 0; other == y && x < w; x++)
+            stay(x, out);
+        return;
+    case ERROR_ROTATE:
+        move(modes, turned, error_modes_at(turned, w - 1, other), -1, y, out);
+        if (centre && other == y)
+            stay(w / 2, out);
+        return;
+    case ERROR_TRANSPOSE:
+        move(modes, columns, error_modes_at(columns, y, 0), columns->across, y, out);
+        stay(y, out);
+        return;
+    case NUM_ERROR_MODES:
+    default: assert(!"no direction");
+    }
 }

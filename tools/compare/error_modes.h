@@ -26,13 +26,14 @@ enum error_mode_kind {
 
 extern const char *const error_mode_name[NUM_ERROR_MODES];
 
-/* All 3 per pixel. */
-struct error_modes_base {
-    int width, height;
-    const struct moments *a, *b;
-    double *sd[2];     /* of the means of A and B, 0 where exact */
-    double *root[2];   /* cube roots of their third cumulants */
-    double *around[2]; /* squares of sd, mean over the 5 x 5 pixels around p without p */
+/* A part of the image with what is around it: a plane of `across` columns for n, three for R, G, B of the others. */
+struct error_modes_frame {
+    int x, y, across, down; /* where it lies in the image */
+    size_t room;            /* pixels that a plane has room for */
+    double *n[2], *mean[2]; /* of A and B */
+    double *sd[2];          /* of their means, 0 where exact */
+    double *root[2];        /* cube roots of their third cumulants */
+    double *around[2];      /* squares of sd, mean over the 5 x 5 pixels around p without p */
     /* 1 / variance around A and B together, which is taken to be at least 3 % of the image's mean; 0
      * where a channel has no noise anywhere. */
     double *weight;
@@ -41,27 +42,43 @@ struct error_modes_base {
     double *mix;
     double *mix_around; /* mean of mix over the 3 x 3 pixels around p without p */
     double *b_around;   /* of B */
+    double *row;        /* for sums */
     double *data;       /* of all these */
 };
+/* In the first plane; those of the other channels are `room` further on each. */
+size_t error_modes_at(const struct error_modes_frame *f, int x, int y);
 
-/* At least 2 pixels. Fails only out of memory. Release with error_modes_base_free(). */
-bool error_modes_base_build(const struct moments *a, const struct moments *b,
-                            struct error_modes_base *out, struct err *e)
-    __attribute__((warn_unused_result));
-void error_modes_base_free(struct error_modes_base *base);
+/* What directions are computed from, for some rows of the image at a time. */
+struct error_modes {
+    const struct moments *side[2];
+    int width, height;
+    double least[3]; /* of the variance that makes a weight */
+    struct error_modes_frame own, turned,
+        columns; /* of the rows, of those that stand in their place top to bottom, and, of a
+                                                   square image, of the columns that do */
+};
+
+/* At least 2 pixels. Fails only out of memory. Release with error_modes_free(). */
+bool error_modes_open(const struct moments *a, const struct moments *b, struct error_modes *out,
+                      struct err *e) __attribute__((warn_unused_result));
+void error_modes_free(struct error_modes *modes);
 
 /* Whether the direction exists for this size of image. */
-bool error_mode_applies(const struct error_modes_base *base, enum error_mode_kind kind);
+bool error_mode_applies(const struct error_modes *modes, enum error_mode_kind kind);
 
-/* One direction in one pixel. */
+enum { ERROR_MODES_BAND = 32 };
+/* Goes to rows y .. y+rows-1, ERROR_MODES_BAND at most. */
+void error_modes_go_to(struct error_modes *modes, int y, int rows);
+
+/* One direction in one row of these, by columns. */
 struct error_change {
-    double d[3]; /* free of what is seen in the pixel */
+    double *d[3]; /* free of what is seen in the pixel */
     /* Variance of sum w D beyond that of D, because d in p is made of pixels in which d is made of p:
      * their product's mean does not vanish where d is B alone. */
-    double coupled;
+    double *coupled;
 };
-struct error_change error_mode_at(const struct error_modes_base *base, enum error_mode_kind kind,
-                                  int x, int y);
+void error_mode_row(const struct error_modes *modes, enum error_mode_kind kind, int y,
+                    const struct error_change *out);
 
 /* Whether a multiple of the direction means something: a shift by 0.3 pixels, but no flip by 0.3. */
 bool error_mode_has_amount(enum error_mode_kind kind);

@@ -34,8 +34,8 @@ struct excess {
 
 static double variance(const struct images *m, int side, size_t i)
 {
-    double n = m->side[side]->n[i / 3];
-    return m->exact[side] ? 0 : m->side[side]->m2[i] / (n * (n - 1));
+    double n = moments_n(m->side[side], i / 3);
+    return m->exact[side] ? 0 : moments_m2(m->side[side], i) / (n * (n - 1));
 }
 
 static size_t at(const struct images *m, int x, int y)
@@ -66,7 +66,7 @@ static bool shifted(const struct images *m, bool down, double amount, int x, int
     size_t p = down ? at(m, x, k) : at(m, k, y), q = down ? at(m, x, next) : at(m, next, y);
     for (size_t c = 0; c < 3; c++) {
         mean[c] =
-            (1 - share) * (double)m->side[1]->mean[p + c] + share * (double)m->side[1]->mean[q + c];
+            (1 - share) * moments_mean(m->side[1], p + c) + share * moments_mean(m->side[1], q + c);
         var[c] = (1 - share) * (1 - share) * variance(m, 1, p + c) +
                  share * share * variance(m, 1, q + c);
     }
@@ -85,7 +85,7 @@ static bool changed(const struct images *m, enum error_mode_kind kind, double am
     size_t p = source(m, kind, x, y);
     for (size_t c = 0; c < 3; c++) {
         size_t i = p + (swaps ? (size_t)from[kind][c] : c);
-        double own = m->side[1]->mean[i], v = variance(m, 1, i), slope = 1;
+        double own = moments_mean(m->side[1], i), v = variance(m, 1, i), slope = 1;
         mean[c] = own;
         if (kind == ERROR_SCALE) {
             slope = exp(amount);
@@ -117,8 +117,9 @@ static void add_block(const struct images *m, enum error_mode_kind kind, double 
                 continue;
             num++;
             for (size_t c = 0, i = at(m, x, y); c < 3; c++, i++) {
-                double d = m->side[0]->mean[i] - m->side[1]->mean[i], va = variance(m, 0, i),
-                       r = m->side[0]->mean[i] - mean[c], vb = variance(m, 1, i);
+                double d = moments_mean(m->side[0], i) - moments_mean(m->side[1], i),
+                       va = variance(m, 0, i), r = moments_mean(m->side[0], i) - mean[c],
+                       vb = variance(m, 1, i);
                 out->before[0] += weight[c] * (d * d - va - vb);
                 out->after[0] += weight[c] * (r * r - va - var[c]);
                 before[c] += d;
@@ -237,8 +238,8 @@ static bool open_images(const struct moments *a, const struct moments *b, struct
         m->weight[3 * k + i % 3] += v;
         num[k] += 1. / 3;
         mean_var += v / (double)values;
-        mean_square += (double)b->mean[i] * b->mean[i] / (double)values;
-        m->mean += (double)b->mean[i] / (double)values;
+        mean_square += moments_mean(b, i) * moments_mean(b, i) / (double)values;
+        m->mean += moments_mean(b, i) / (double)values;
     }
     for (size_t k = 0; k < 3 * blocks; k++)
         m->weight[k] =

@@ -27,18 +27,20 @@ static bool check_options(const struct compare_options *opt, struct err *e)
 static bool check_pixel(const struct moments *m, size_t p, bool exact, struct err *e)
 {
     int x = (int)(p % (size_t)m->width), y = (int)(p / (size_t)m->width);
-    if (!(m->n[p] >= (exact ? 1 : 3)) || isinf(m->n[p]))
-        return err_set(e, "pixel %d,%d has %g observations, at least 3 are needed", x, y, m->n[p]);
+    double n = moments_n(m, p);
+    if (!(n >= (exact ? 1 : 3)) || isinf(n))
+        return err_set(e, "pixel %d,%d has %g observations, at least 3 are needed", x, y, n);
     for (size_t i = 3 * p; i < 3 * p + 3; i++) {
-        if (isnan(m->mean[i]) || isnan(m->m2[i]) || isnan(m->m3[i]))
+        double mean = moments_mean(m, i), m2 = moments_m2(m, i), m3 = moments_m3(m, i);
+        if (isnan(mean) || isnan(m2) || isnan(m3))
             return err_set(e, "pixel %d,%d is not a number", x, y);
-        if (isinf(m->mean[i]) || isinf(m->m2[i]) || isinf(m->m3[i]))
+        if (isinf(mean) || isinf(m2) || isinf(m3))
             return err_set(e, "pixel %d,%d is infinite", x, y);
-        if (m->mean[i] < 0)
-            return err_set(e, "pixel %d,%d has negative radiance %g", x, y, m->mean[i]);
-        if (m->m2[i] < 0)
-            return err_set(e, "pixel %d,%d has a negative sum of squares %g", x, y, m->m2[i]);
-        if (exact && m->m2[i] != 0)
+        if (mean < 0)
+            return err_set(e, "pixel %d,%d has negative radiance %g", x, y, mean);
+        if (m2 < 0)
+            return err_set(e, "pixel %d,%d has a negative sum of squares %g", x, y, m2);
+        if (exact && m2 != 0)
             return err_set(e, "pixel %d,%d is called exact but has variance", x, y);
     }
     return true;
@@ -66,17 +68,20 @@ static bool check_side(const struct moments *m, struct judge *j, struct err *e)
     for (size_t p = 0; p < pixels; p++) {
         if (!check_pixel(m, p, exact, e))
             return false;
-        if (!exact)
-            j->n_min = fmin(j->n_min, m->n[p]);
+        double n = moments_n(m, p);
+        if (!exact && n < j->n_min)
+            j->n_min = n;
         for (size_t c = 0; c < 3; c++) {
-            double mean = m->mean[3 * p + c], m2 = m->m2[3 * p + c];
+            double mean = moments_mean(m, 3 * p + c), m2 = moments_m2(m, 3 * p + c);
             varies = varies || m2 > 0;
-            if (mean > 0)
-                j->event[c] = fmax(j->event[c], mean + m2 / (m->n[p] * mean));
+            double event = mean > 0 ? mean + m2 / (n * mean) : 0;
+            if (event > j->event[c])
+                j->event[c] = event;
         }
     }
     if (replicates && !varies)
-        return err_set(e, "%g replicates without any variance: was the seed ignored?", m->n[0]);
+        return err_set(e, "%g replicates without any variance: was the seed ignored?",
+                       moments_n(m, 0));
     return true;
 }
 
@@ -139,7 +144,7 @@ bool input_checks_run(const struct moments *a, const struct moments *b,
     for (int c = 0; c < 3; c++) {
         j->event[CHANNEL_LUMINANCE] += luminance_weight[c] * j->event[c];
         for (size_t p = 0; p < pixels; p++)
-            luminance += luminance_weight[c] * b->mean[3 * p + (size_t)c];
+            luminance += luminance_weight[c] * moments_mean(b, 3 * p + (size_t)c);
     }
     if (!(luminance > 0))
         return err_set(e, "B is black: relative differences have no unit");

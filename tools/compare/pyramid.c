@@ -1,44 +1,37 @@
 #include "pyramid.h"
 
+#include "renderer/base/huge_alloc.h"
+
 #include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+enum { SMALLEST_BAND = 32 }; /* rows */
 const double float_tolerance = 1e-5;
 const double luminance_weight[3] = {0.2126, 0.7152, 0.0722};
 
-struct estimate pyramid_estimate_from(double mean, double v, double k3, double n)
-{
-    struct estimate est = {.mean = mean, .v = v, .k3 = k3};
-    if (v > 0) {
-        est.var_v_normal = 2 * v * v / (n - 1);
-        est.var_v = fmax(est.var_v_normal, k3 * k3 / v);
-        est.var_k3 = 6 * v * v * v / ((n - 1) * (n - 2));
-    }
-    return est;
-}
-
 struct estimate pyramid_pixel_estimate(const struct moments *m, size_t pixel, int channel)
 {
-    double n = m->n[pixel];
+    double n = moments_n(m, pixel);
     bool exact = strcmp(m->unit, "exact") == 0;
     assert(exact || n >= 3);
     double v_scale = exact ? 0 : 1 / (n * (n - 1));
     double k_scale = exact ? 0 : v_scale / (n - 2);
-    const double *mean = m->mean + 3 * pixel, *m2 = m->m2 + 3 * pixel, *m3 = m->m3 + 3 * pixel;
     const double *tolerance = m->tolerance != NULL ? m->tolerance + 3 * pixel : (double[3]){0};
     if (channel < CHANNEL_LUMINANCE) {
-        struct estimate est =
-            pyramid_estimate_from(mean[channel], m2[channel] * v_scale, m3[channel] * k_scale, n);
+        size_t i = 3 * pixel + (size_t)channel;
+        struct estimate est = pyramid_estimate_from(moments_mean(m, i), moments_m2(m, i) * v_scale,
+                                                    moments_m3(m, i) * k_scale, n);
         est.tolerance = tolerance[channel];
         return est;
     }
     double sum = 0, deviation = 0, root = 0, rounding = 0;
-    for (int c = 0; c < 3; c++) {
-        sum += luminance_weight[c] * mean[c];
-        deviation += luminance_weight[c] * sqrt(m2[c] * v_scale);
-        root += luminance_weight[c] * cbrt(m3[c] * k_scale);
+    for (size_t c = 0; c < 3; c++) {
+        size_t i = 3 * pixel + c;
+        sum += luminance_weight[c] * moments_mean(m, i);
+        deviation += luminance_weight[c] * sqrt(moments_m2(m, i) * v_scale);
+        root += luminance_weight[c] * cbrt(moments_m3(m, i) * k_scale);
         rounding += luminance_weight[c] * tolerance[c];
     }
     struct estimate est = pyramid_estimate_from(sum, deviation * deviation, root * root * root, n);
@@ -88,8 +81,9 @@ static bool one_value(const struct moments *m, size_t pixel, int channel)
     int last = channel < CHANNEL_LUMINANCE ? channel : 2;
     for (int c = first; observed && c <= last; c++) {
         size_t i = 3 * pixel + (size_t)c;
-        observed =
-            m->mean[i] > 0 && m->m2[i] <= (m->n[pixel] - 1) * pow(float_tolerance * m->mean[i], 2);
+        double mean = moments_mean(m, i);
+        observed = mean > 0 &&
+                   moments_m2(m, i) <= (moments_n(m, pixel) - 1) * pow(float_tolerance * mean, 2);
     }
     return observed;
 }
@@ -104,8 +98,9 @@ static void fill_pixels(const struct moments *a, const struct moments *b, int ch
         level->cell[p] = (struct cell){0};
         pyramid_add_pixel(&level->cell[p], &ea, &eb);
         if (one_value(a, p, channel) && one_value(b, p, channel))
-            level->cell[p].log10_alike = fmin(log10_one_value_each(a->n[p], b->n[p]),
-                                              log10_one_value_each(b->n[p], a->n[p]));
+            level->cell[p].log10_alike =
+                fmin(log10_one_value_each(moments_n(a, p), moments_n(b, p)),
+                     log10_one_value_each(moments_n(b, p), moments_n(a, p)));
     }
 }
 
@@ -143,39 +138,75 @@ static void add_level(struct pyramid *p, int side, int nx, int ny)
     p->level[p->num_levels++] = (struct pyramid_level){.side = side, .nx = nx, .ny = ny};
 }
 
+struct pyramid pyramid_levels(int width, int height, int tile)
+{
+    struct pyramid p = {.width = width, .height = height};
+    assert(tile >= 1);
+    tile = least(tile, width > height ? width : height);
+    for (int side = 1; side < tile; side *= 2)
+        add_level(&p, side, (width - 1) / side + 1, (height - 1) / side + 1);
+    p.tile_level = p.num_levels;
+    int nx = pyramid_tiles(width, tile), ny = pyramid_tiles(height, tile);
+    for (int side = tile;; side *= 2, nx = (nx + 1) / 2, ny = (ny + 1) / 2) {
+        add_level(&p, side, nx, ny);
+        if (nx == 1 && ny == 1)
+            return p;
+    }
+}
+
+/* Zeroed. */
+static bool alloc_cells(struct pyramid *p, struct err *e)
+{
+    /* NOLINTNEXTLINE(clang-analyzer-optin.portability.UnixAPI): an image has a pixel. */
+    p->cells = huge_calloc(pyramid_regions(p), sizeof *p->cells);
+    if (p->cells == NULL)
+        return err_set(e, "out of memory for the regions of %d x %d pixels", p->width, p->height);
+    struct cell *next = p->cells;
+    for (int i = 0; i < p->num_levels; i++) {
+        p->level[i].cell = next;
+        next += (size_t)p->level[i].nx * (size_t)p->level[i].ny;
+    }
+    return true;
+}
+
 bool pyramid_build(const struct moments *a, const struct moments *b, int channel, int tile,
                    struct pyramid *out, struct err *e)
 {
-    assert(a->width == b->width && a->height == b->height && tile >= 1);
-    *out = (struct pyramid){.width = a->width, .height = a->height};
-    tile = least(tile, a->width > a->height ? a->width : a->height);
-    for (int side = 1; side < tile; side *= 2)
-        add_level(out, side, (a->width - 1) / side + 1, (a->height - 1) / side + 1);
-    out->tile_level = out->num_levels;
-    int nx = pyramid_tiles(a->width, tile), ny = pyramid_tiles(a->height, tile);
-    for (int side = tile;; side *= 2, nx = (nx + 1) / 2, ny = (ny + 1) / 2) {
-        add_level(out, side, nx, ny);
-        if (nx == 1 && ny == 1)
-            break;
-    }
-    /* NOLINTNEXTLINE(clang-analyzer-optin.portability.UnixAPI): an image has a pixel. */
-    out->cells = calloc(pyramid_regions(out), sizeof *out->cells);
-    if (out->cells == NULL)
-        return err_set(e, "out of memory for the regions of %d x %d pixels", a->width, a->height);
-    struct cell *next = out->cells;
+    assert(a->width == b->width && a->height == b->height);
+    *out = pyramid_levels(a->width, a->height, tile);
+    if (!alloc_cells(out, e))
+        return false;
     for (int i = 0; i < out->num_levels; i++) {
-        struct pyramid_level *level = &out->level[i];
-        level->cell = next;
-        next += (size_t)level->nx * (size_t)level->ny;
-    }
-    for (int i = 0; i < out->num_levels; i++) {
-        struct pyramid_level *level = &out->level[i];
-        if (level->side == 1)
-            fill_pixels(a, b, channel, level);
+        if (out->level[i].side == 1)
+            fill_pixels(a, b, channel, &out->level[i]);
         else /* a tile that is no power of two is not made of the level below it */
             fill_from(out, i == out->tile_level ? 0 : i - 1, i);
     }
     return true;
+}
+
+int pyramid_band(const struct pyramid *levels)
+{
+    int tile = levels->level[levels->tile_level].side;
+    if ((tile & (tile - 1)) != 0 || tile > levels->height / 2)
+        return levels->height;
+    return tile < SMALLEST_BAND / 2 ? SMALLEST_BAND : 2 * tile;
+}
+
+bool pyramid_above(const struct pyramid *levels, struct pyramid *out, struct err *e)
+{
+    *out = *levels;
+    out->tile_level = 0;
+    out->num_levels -= levels->tile_level;
+    memmove(out->level, levels->level + levels->tile_level,
+            (size_t)out->num_levels * sizeof *out->level);
+    return alloc_cells(out, e);
+}
+
+void pyramid_sum_up(struct pyramid *above)
+{
+    for (int i = 1; i < above->num_levels; i++)
+        fill_from(above, i - 1, i);
 }
 
 void pyramid_free(struct pyramid *p)

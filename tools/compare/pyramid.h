@@ -31,7 +31,16 @@ struct estimate {
 struct estimate pyramid_pixel_estimate(const struct moments *m, size_t pixel, int channel);
 
 /* From the moments of any sum of a pixel's channels. v = 0: no noise. */
-struct estimate pyramid_estimate_from(double mean, double v, double k3, double n);
+static inline struct estimate pyramid_estimate_from(double mean, double v, double k3, double n)
+{
+    double normal = 2 * v * v / (n - 1), skewed = k3 * k3 / v,
+           sixth = 6 * v * v * v / ((n - 1) * (n - 2)), most = normal > skewed ? normal : skewed;
+    struct estimate est = {.mean = mean, .v = v, .k3 = k3};
+    est.var_v_normal = v > 0 ? normal : 0;
+    est.var_v = v > 0 ? most : 0;
+    est.var_k3 = v > 0 ? sixth : 0;
+    return est;
+}
 
 /* Sums over the pixels of a region, or of their products with weights. */
 struct cell {
@@ -52,21 +61,34 @@ struct pyramid_level {
     struct cell *cell; /* ny rows of nx */
 };
 
+enum { PYRAMID_LEVELS = 40 };
 struct pyramid {
     int width, height;
     int num_levels;
     int tile_level; /* its side is the reporting tile */
-    struct pyramid_level level[40];
+    struct pyramid_level level[PYRAMID_LEVELS];
     struct cell *cells; /* of all levels */
 };
 
 /* Reporting tiles along `length` pixels, at least 1: the last has from 1/2 to 3/2 of a tile's pixels, or all. */
 int pyramid_tiles(int length, int tile);
 
-/* Same sizes, tile >= 1; beyond the longer side it is that side. Fails only out of memory. Release with pyramid_free(). */
+/* The levels of an image without their cells. tile >= 1; beyond the longer side it is that side. */
+struct pyramid pyramid_levels(int width, int height, int tile);
+
+/* Same sizes. Fails only out of memory. Release with pyramid_free(). */
 bool pyramid_build(const struct moments *a, const struct moments *b, int channel, int tile,
                    struct pyramid *out, struct err *e) __attribute__((warn_unused_result));
 void pyramid_free(struct pyramid *p);
+
+/* The same in two parts, in less memory. An image is cut from the top into bands of so many rows, the last of up to twice as
+ * many: pyramid_build() of a band has all levels below the tile's, and two more, as they are in the image's. */
+int pyramid_band(const struct pyramid *levels);
+/* Levels from the tile's on, which is number 0, are made of its cells, zeroed here and added to by the caller, by
+ * pyramid_sum_up(). Fails and is released as above. */
+bool pyramid_above(const struct pyramid *levels, struct pyramid *out, struct err *e)
+    __attribute__((warn_unused_result));
+void pyramid_sum_up(struct pyramid *above);
 
 void pyramid_add_pixel(struct cell *dst, const struct estimate *a, const struct estimate *b);
 

@@ -35,8 +35,8 @@ struct pixels {
 
 static double variance(const struct moments *m, size_t p)
 {
-    const double *m2 = &m->m2[3 * p];
-    return (m2[0] + m2[1] + m2[2]) / (m->n[p] - 1);
+    return (moments_m2(m, 3 * p) + moments_m2(m, 3 * p + 1) + moments_m2(m, 3 * p + 2)) /
+           (moments_n(m, p) - 1);
 }
 
 static struct pixels sum_pixels(const struct moments *a, const struct moments *b, double paths_a,
@@ -127,9 +127,11 @@ struct variance_ratio variance_ratio_test(const struct moments *a, const struct 
 
 static bool same_pixel(const struct moments *a, const struct moments *b, size_t p)
 {
-    size_t i = 3 * p, size = 3 * sizeof *a->mean;
-    return a->n[p] == b->n[p] && memcmp(&a->mean[i], &b->mean[i], size) == 0 &&
-           memcmp(&a->m2[i], &b->m2[i], size) == 0 && memcmp(&a->m3[i], &b->m3[i], size) == 0;
+    bool same = moments_n(a, p) == moments_n(b, p);
+    for (size_t i = 3 * p; same && i < 3 * p + 3; i++)
+        same = moments_mean(a, i) == moments_mean(b, i) && moments_m2(a, i) == moments_m2(b, i) &&
+               moments_m3(a, i) == moments_m3(b, i);
+    return same;
 }
 
 size_t variance_ratio_shared(const struct moments *a, const struct moments *b)
@@ -146,17 +148,29 @@ size_t variance_ratio_shared(const struct moments *a, const struct moments *b)
     return p <= shared_level ? same : 0;
 }
 
+/* moments_var_of_mean() of samples or replicates. */
+static double var_of_mean(const struct moments *m, size_t p, size_t i)
+{
+    double n = moments_n(m, p);
+    return n < 2 ? NAN : moments_m2(m, i) / (n * (n - 1));
+}
+
 double variance_ratio_of_difference(const struct moments *a, const struct moments *b)
 {
     size_t pixels = (size_t)a->width * (size_t)a->height;
+    const bool exact[2] = {strcmp(a->unit, "exact") == 0, strcmp(b->unit, "exact") == 0};
     double largest = 0, log10_p = 0;
+    if (strcmp(a->unit, "stratified") == 0 || strcmp(b->unit, "stratified") == 0)
+        return 1;
     for (size_t c = 0; c < 3; c++) {
         double sum = 0, num = 0;
         for (size_t p = 0; p < pixels; p++) {
             size_t i = 3 * p + c;
-            double v = moments_var_of_mean(a, p, (int)c) + moments_var_of_mean(b, p, (int)c);
+            double v =
+                (exact[0] ? 0 : var_of_mean(a, p, i)) + (exact[1] ? 0 : var_of_mean(b, p, i));
             if (v > 0) {
-                sum += pow(a->mean[i] - b->mean[i], 2) / v;
+                double d = moments_mean(a, i) - moments_mean(b, i);
+                sum += d * d / v;
                 num++;
             }
         }

@@ -54,7 +54,8 @@ static bool read_moments(const char *path, char side, const struct input_options
                          struct input *out, struct err *e)
 {
     out->kind = INPUT_MOMENTS;
-    if (!moments_read(path, &out->m, NULL, e))
+    if (!(opt->packed ? moments_read_packed(path, &out->m, e)
+                      : moments_read(path, &out->m, NULL, e)))
         return false;
     if (strcmp(out->m.unit, "picture") == 0)
         return err_set(e, "%s: is one side of a comparison; its variance belongs to both", path);
@@ -206,11 +207,22 @@ static bool pair_images(struct input *a, struct input *b, struct notes *notes, s
     return true;
 }
 
+/* Nothing of it will be changed. */
+static bool is_ready(const struct input *in)
+{
+    return (in->kind == INPUT_MOMENTS || in->kind == INPUT_REPLICATES) && !in->is_xyz &&
+           in->censored == NULL;
+}
+
 bool input_pair(struct input *a, struct input *b, struct notes *notes, struct err *e)
 {
     if (a->m.width != b->m.width || a->m.height != b->m.height)
         return err_set(e, "A is %d x %d pixels, B is %d x %d", a->m.width, a->m.height, b->m.width,
                        b->m.height);
+    if (is_ready(a) && is_ready(b))
+        return true;
+    if (!moments_unpack(&a->m, e) || !moments_unpack(&b->m, e))
+        return false;
     if (a->is_xyz || b->is_xyz) {
         input_to_xyz(a);
         input_to_xyz(b);

@@ -28,6 +28,7 @@ enum input_kind {
 struct input_options {
     const char *curve; /* of integer images (tone_curve.h); NULL: not known */
     double spp;        /* samples per pixel of a side whose file does not say; 0: not known */
+    bool packed;       /* leave those of a moments EXR packed (moments.h) */
 };
 
 struct input {
@@ -59,7 +60,7 @@ bool input_take(const struct input_memory *memory, const char *name, char side,
                 struct err *e) __attribute__((warn_unused_result));
 void input_free(struct input *in);
 
-/* Makes both fit for compare_moments(): the same colour space, censored pixels out of both (0, exact,
+/* Makes both fit for compare_moments(), packed or not: the same colour space, censored pixels out of both (0, exact,
  * whatever they were), skewness bounded where it is not known, and variance from the images
  * themselves if one of them has none. */
 bool input_pair(struct input *a, struct input *b, struct notes *notes, struct err *e)

@@ -102,7 +102,7 @@ static bool job_of(const struct assay_options *o, struct assay_comparison *c, st
         .tile = all.tile,
         .margin_variance = all.margin_variance};
     for (int i = 0; i < 2; i++)
-        c->job.input[i] = (struct input_options){c->curve, all.spp[i]};
+        c->job.input[i] = (struct input_options){.curve = c->curve, .spp = all.spp[i]};
     c->job.accept_mdb[0] = all.accept_mdb;
     c->job.accept_mdb[1] = all.accept_mdb_tile;
     c->job.paired = all.paired;

@@ -127,9 +127,9 @@ json_t *claim_result_not_judged(const struct claim_context *c, const char *error
 bool claim_result_add_observations(json_t *claim, const char *side, const struct moments *m)
 {
     char key[16];
-    double n = m->n[0];
+    double n = moments_n(m, 0);
     for (size_t p = 1; p < (size_t)m->width * (size_t)m->height; p++)
-        n = m->n[p] < n ? m->n[p] : n;
+        n = moments_n(m, p) < n ? moments_n(m, p) : n;
     snprintf(key, sizeof key, "n_%s", side);
     bool ok = json_object_set_new(claim, key, json_real(n)) == 0;
     snprintf(key, sizeof key, "unit_%s", side);

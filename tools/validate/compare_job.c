@@ -88,13 +88,14 @@ static bool pair_read(const struct compare_job *job, const char *const path[2],
     *p = (struct pair){0};
     bool ok = true;
     for (int i = 0; ok && i < 2; i++) {
-        const struct input_options *opt = &job->input[i];
+        struct input_options opt = job->input[i];
+        opt.packed = !job->paired;
         const char name = "ab"[i];
         struct input *in = &p->in[i];
         if (memory[i] != NULL)
-            ok = input_take(memory[i], path[i], name, opt, in, notes, e);
+            ok = input_take(memory[i], path[i], name, &opt, in, notes, e);
         else
-            ok = input_read(path[i], name, opt, in, notes, e);
+            ok = input_read(path[i], name, &opt, in, notes, e);
     }
     for (int i = 0; ok && i < 2; i++) /* a curve that nothing is decoded by is a mistake */
         ok = job->input[i].curve == NULL || p->in[0].censored != NULL ||

@@ -35,7 +35,7 @@ static bool renders_take(const struct moments *m, struct renders *r, struct err 
     if (r->mean == NULL)
         return err_set(e, "out of memory for an image");
     for (size_t i = 0; i < values; i++)
-        r->mean[i] = (float)m->mean[i];
+        r->mean[i] = (float)moments_mean(m, i);
     r->num = 1;
     r->width = m->width;
     r->height = m->height;
@@ -77,10 +77,11 @@ static bool renders_read(const char *path, const struct input_memory *memory, st
 /* Both must have been asked for the same: where each side has one number of samples in all pixels, that is it. */
 static bool check_samples(const struct moments *m, struct err *e)
 {
-    double n[2] = {m[0].n[0] * m[0].spp, m[1].n[0] * m[1].spp};
+    double first[2] = {moments_n(&m[0], 0), moments_n(&m[1], 0)},
+           n[2] = {first[0] * m[0].spp, first[1] * m[1].spp};
     size_t pixels = (size_t)m[0].width * (size_t)m[0].height;
     for (size_t i = 0; i < pixels; i++)
-        if (m[0].n[i] != m[0].n[0] || m[1].n[i] != m[1].n[0])
+        if (moments_n(&m[0], i) != first[0] || moments_n(&m[1], i) != first[1])
             return true;
     return n[0] == n[1] || err_set(e,
                                    "A has %g samples a pixel, B %g: only with equally many can two "
