@@ -39,18 +39,19 @@ static void merge(const struct judge *j, const struct pyramid *p, int below, int
                   const struct part *from, struct part *to)
 {
     const struct pyramid_level *fine = &p->level[below], *coarse = &p->level[l];
-    size_t parts = (size_t)fine->nx * (size_t)fine->ny;
+    const int factor = coarse->side / fine->side;
     size_t regions = (size_t)coarse->nx * (size_t)coarse->ny;
     for (size_t i = 0; i < regions; i++)
         to[i] = (struct part){.whole = true};
-    for (size_t i = 0; i < parts; i++) {
-        struct part *d = &to[pyramid_parent(p, below, l, i)];
-        d->sum += from[i].sum;
-        d->num += from[i].num;
-        d->whole = d->whole && from[i].whole;
-    }
+    for (int y = 0; y < fine->ny; y++)
+        for (int x = 0; x < fine->nx; x++, from++) {
+            struct part *d = &to[pyramid_around(coarse, factor, x, y)];
+            d->sum += from->sum;
+            d->num += from->num;
+            d->whole = d->whole && from->whole;
+        }
     for (size_t i = 0; i < regions; i++) {
-        if (to[i].whole)
+        if (to[i].whole || region_is_skewed(j, &coarse->cell[i]))
             continue;
         struct measured m = region_measure(j, &coarse->cell[i], pyramid_rect(p, l, i));
         if (region_is_normal(j, &m))
@@ -68,8 +69,12 @@ static void begin(const struct judge *j, const struct pyramid *p, struct part *p
 {
     size_t regions = regions_of(p, 0);
     for (size_t i = 0; i < regions; i++) {
+        part[i] = (struct part){0};
+        if (region_is_skewed(j, &p->level[0].cell[i]))
+            continue;
         struct measured m = region_measure(j, &p->level[0].cell[i], pyramid_rect(p, 0, i));
-        part[i] = region_is_normal(j, &m) ? part_of(&m) : (struct part){0};
+        if (region_is_normal(j, &m))
+            part[i] = part_of(&m);
     }
 }
 
@@ -87,18 +92,12 @@ static struct part *merge_up(const struct judge *j, const struct pyramid *p, int
     return from;
 }
 
-bool chi_square_gather(const struct judge *j, const struct pyramid *band, struct part *tiles,
-                       struct err *e)
+void chi_square_gather(const struct judge *j, const struct pyramid *band, struct part *part,
+                       struct part *tiles)
 {
-    struct part *part = malloc(2 * regions_of(band, 0) * sizeof *part);
-    if (part == NULL)
-        return err_set(e, "out of memory for the regions of %d x %d pixels", band->width,
-                       band->height);
     begin(j, band, part);
     memcpy(tiles, merge_up(j, band, band->tile_level, part),
            regions_of(band, band->tile_level) * sizeof *tiles);
-    free(part);
-    return true;
 }
 
 static void test(struct judge *j, const struct pyramid *above, int channel, int side,

@@ -20,9 +20,9 @@ struct part {
     bool whole; /* they cover all of it */
 };
 
-/* The finest partition of a band, as parts of its tiles. Fails only out of memory. */
-bool chi_square_gather(const struct judge *j, const struct pyramid *band, struct part *tiles,
-                       struct err *e) __attribute__((warn_unused_result));
+/* The finest partition of a band, as parts of its tiles. `part` has room for its pixels twice. */
+void chi_square_gather(const struct judge *j, const struct pyramid *band, struct part *part,
+                       struct part *tiles);
 
 /* Two tests in this channel: over the finest partition of the image into testable regions, of which `tiles` has what was
  * gathered and room for as many, and over one whose regions are reporting tiles or larger. Counts them in j->num_tests. */

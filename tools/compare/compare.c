@@ -58,8 +58,10 @@ struct sweep {
     struct pyramid above;
     size_t tested[PYRAMID_LEVELS]; /* of each level of the image */
     struct worst *worst;           /* of the image and of all smaller ones */
-    struct part *tiles;            /* chi_square.h; room for them twice */
-    double squared;                /* squared_bias() */
+    struct pyramid band;
+    struct part *part,
+        *tiles;     /* chi_square.h: of the largest band, and of the tiles; room for them twice */
+    double squared; /* squared_bias() */
 };
 
 /* Beyond that z the smallest log10 p is all that is known. */
@@ -72,6 +74,8 @@ static void scan(const struct judge *j, const struct pyramid *p, int l, int y, i
     const struct pyramid_level *level = &p->level[l];
     size_t regions = (size_t)level->nx * (size_t)level->ny;
     for (size_t i = 0; i < regions; i++) {
+        if (region_is_hopeless(j, &level->cell[i]))
+            continue;
         struct measured m = measure_in(j, p, l, i);
         if (!region_testable(j, &m))
             continue;
@@ -114,9 +118,9 @@ static void fill_images(const struct judge *j, const struct pyramid *p, size_t f
 {
     size_t pixels = (size_t)p->width * (size_t)p->height;
     for (size_t i = 0; i < pixels; i++) {
-        struct measured m = region_measure(j, &p->level[0].cell[i], pyramid_rect(p, 0, i));
-        out->z.data[first + i] = (float)fmin(largest_z, fmax(-largest_z, region_t(&m)));
-        out->relative.data[first + i] = (float)(m.d / m.unit);
+        double relative, t = region_pixel_t(j, &p->level[0].cell[i], &relative);
+        out->z.data[first + i] = (float)fmin(largest_z, fmax(-largest_z, t));
+        out->relative.data[first + i] = (float)relative;
     }
 }
 
@@ -124,25 +128,29 @@ static void fill_images(const struct judge *j, const struct pyramid *p, size_t f
 static bool sweep_band(const struct judge *j, const struct moments *a, const struct moments *b,
                        int y, struct sweep *s, struct comparison *out, struct err *e)
 {
-    struct pyramid p;
-    if (!pyramid_build(a, b, s->channel, j->opt.tile, &p, e))
+    struct pyramid *p = &s->band;
+    if (!pyramid_rebuild(a, b, s->channel, j->opt.tile, p, e))
         return false;
-    bool ok = true;
-    for (int l = p.tile_level - 1; l >= 0; l--)
-        scan(j, &p, l, y, l, s);
-    const struct pyramid_level *tile = &p.level[p.tile_level];
+    for (int l = p->tile_level - 1; l >= 0; l--)
+        scan(j, p, l, y, l, s);
+    const struct pyramid_level *tile = &p->level[p->tile_level];
     size_t first = (size_t)(y / tile->side) * (size_t)tile->nx;
     memcpy(s->above.level[0].cell + first, tile->cell,
            (size_t)tile->nx * (size_t)tile->ny * sizeof *tile->cell);
     if (s->channel == CHANNEL_LUMINANCE) {
-        fill_images(j, &p, (size_t)y * (size_t)p.width, out);
+        fill_images(j, p, (size_t)y * (size_t)p->width, out);
     } else {
-        add_squared_bias(&p, &s->squared);
+        add_squared_bias(p, &s->squared);
         if (j->share[STATISTIC_CHI_SQUARE] > 0)
-            ok = chi_square_gather(j, &p, s->tiles + first, e);
+            chi_square_gather(j, p, s->part, s->tiles + first);
     }
-    pyramid_free(&p);
-    return ok;
+    return true;
+}
+
+/* Rows of the largest band. */
+static int last_band(int height, int band)
+{
+    return height < band ? height : height - (height / band - 1) * band;
 }
 
 /* All of a channel. `levels` are the image's. */
@@ -290,9 +298,11 @@ bool compare_moments(const struct moments *a, const struct moments *b,
     const struct pyramid levels = pyramid_levels(a->width, a->height, opt->tile);
     const struct pyramid_level *tile = &levels.level[levels.tile_level];
     set_guards(&j, pyramid_regions(&levels));
+    const int rows = last_band(a->height, pyramid_band(&levels));
     s.tiles = malloc(2 * (size_t)tile->nx * (size_t)tile->ny * sizeof *s.tiles);
-    if (s.tiles == NULL) {
-        err_set(e, "out of memory for the tiles of %d x %d pixels", a->width, a->height);
+    s.part = malloc(2 * (size_t)a->width * (size_t)rows * sizeof *s.part);
+    if (s.tiles == NULL || s.part == NULL) {
+        err_set(e, "out of memory for the regions of %d x %d pixels", a->width, a->height);
         goto fail;
     }
     if (!image_alloc(&out->z, a->width, a->height, 1, (const char *const[]){"z"}, e) ||
@@ -333,12 +343,16 @@ bool compare_moments(const struct moments *a, const struct moments *b,
     verdict_decide(out, opt, tiles);
     free(tiles);
     free(s.tiles);
+    free(s.part);
+    pyramid_free(&s.band);
     pyramid_free(&s.above);
     return true;
 
 fail:
     free(tiles);
     free(s.tiles);
+    free(s.part);
+    pyramid_free(&s.band);
     pyramid_free(&s.above);
     comparison_free(out);
     return false;

@@ -12,9 +12,25 @@ enum {
     ENOUGH_TO_FIT = 1 << 15, /* pixels */
     ENOUGH = 1 << 18,
     GRID = 16, /* amounts that are tried first, either way; of shifts pixels */
-    REFINE = 20
+    REFINE = 20,
+    REACH = GRID + 2, /* of a shift and of what lies between pixels */
+    STRIP = BLOCK + 2 * REACH
 };
 static const double enough_removed = 0.9, certain = 5 /* standard errors of noise alone */;
+
+/* One channel of a pixel: mean and its variance. */
+struct value {
+    double mean, var;
+};
+
+/* Blocks that stand for all, what they hold of A and B, one after the other, and, where they are changed by many amounts, of B
+ * what a shift might bring there. */
+struct sample {
+    int step; /* each step-th block */
+    struct value (*side[2])[3];
+    struct value (*strips)[STRIP * BLOCK]
+                          [3]; /* each block's, pixels along the shift and then across; or NULL */
+};
 
 struct images {
     const struct moments *side[2];
@@ -23,6 +39,7 @@ struct images {
     double *weight;  /* 3 for each block: 1 / variance of a pixel's A - B there */
     double mean;     /* of B */
     bool stands_out; /* A - B, from its noise */
+    struct sample few, many;
 };
 
 /* Squared differences, noise removed: of pixels, and of the means of blocks. */
@@ -54,78 +71,107 @@ static size_t source(const struct images *m, enum error_mode_kind kind, int x, i
               kind == ERROR_FLIP_Y || turned ? h - 1 - y : y);
 }
 
-/* B between two pixels. False where it would come from beyond the border. */
-static bool shifted(const struct images *m, bool down, double amount, int x, int y, double mean[3],
-                    double var[3])
+static struct value value_of(const struct images *m, int side, size_t i)
 {
-    double from = (down ? y : x) - amount, low = floor(from), share = from - low;
-    int last = (down ? m->side[1]->height : m->side[1]->width) - 1, k = (int)low;
+    return (struct value){moments_mean(m->side[side], i), variance(m, side, i)};
+}
+
+/* A change to be tried; the amount is the logarithm of a factor or an exponent, in means, or in pixels. */
+struct change {
+    enum error_mode_kind kind;
+    double amount, factor; /* its exponential */
+    const struct sample *sample;
+};
+
+/* B `along` pixels from the left or top in the strip of block number k, or where there are no strips. */
+static const struct value *strip_at(const struct images *m, const struct change *how, size_t k,
+                                    int along, int x, int y, struct value room[3])
+{
+    const bool down = how->kind == ERROR_SHIFT_Y;
+    const int origin = (down ? y : x) / BLOCK * BLOCK - REACH, across = (down ? x : y) % BLOCK;
+    if (how->sample->strips != NULL)
+        return how->sample->strips[k][(along - origin) * BLOCK + across];
+    const size_t i = down ? at(m, x, along) : at(m, along, y);
+    for (size_t c = 0; c < 3; c++)
+        room[c] = value_of(m, 1, i + c);
+    return room;
+}
+
+/* B between two pixels. False where it would come from beyond the border. */
+static bool shifted(const struct images *m, const struct change *how, size_t k, int x, int y,
+                    struct value out[3])
+{
+    const bool down = how->kind == ERROR_SHIFT_Y;
+    double from = (down ? y : x) - how->amount, low = floor(from), share = from - low;
+    int last = (down ? m->side[1]->height : m->side[1]->width) - 1, i = (int)low;
+    struct value room[2][3];
     if (from < 0 || from > last)
         return false;
-    int next = k < last ? k + 1 : k;
-    size_t p = down ? at(m, x, k) : at(m, k, y), q = down ? at(m, x, next) : at(m, next, y);
-    for (size_t c = 0; c < 3; c++) {
-        mean[c] =
-            (1 - share) * moments_mean(m->side[1], p + c) + share * moments_mean(m->side[1], q + c);
-        var[c] = (1 - share) * (1 - share) * variance(m, 1, p + c) +
-                 share * share * variance(m, 1, q + c);
-    }
+    const struct value *p = strip_at(m, how, k, i, x, y, room[0]),
+                       *q = strip_at(m, how, k, i < last ? i + 1 : i, x, y, room[1]);
+    for (size_t c = 0; c < 3; c++)
+        out[c] = (struct value){(1 - share) * p[c].mean + share * q[c].mean,
+                                (1 - share) * (1 - share) * p[c].var + share * share * q[c].var};
     return true;
 }
 
-/* B, changed: mean and variance. The amount is the logarithm of a factor or an exponent, in means, or in pixels. */
-static bool changed(const struct images *m, enum error_mode_kind kind, double amount, int x, int y,
-                    double mean[3], double var[3])
+/* B, changed: mean and variance. `own`: what it was; k: number of its block in the sample. */
+static bool changed(const struct images *m, const struct change *how, size_t k, int x, int y,
+                    const struct value own[3], struct value out[3])
 {
-    static const int from[NUM_ERROR_MODES][3] = {
+    static const size_t from[NUM_ERROR_MODES][3] = {
         [ERROR_SWAP_RB] = {2, 1, 0}, [ERROR_SWAP_RG] = {1, 0, 2}, [ERROR_SWAP_GB] = {0, 2, 1}};
+    const enum error_mode_kind kind = how->kind;
     if (kind == ERROR_SHIFT_X || kind == ERROR_SHIFT_Y)
-        return shifted(m, kind == ERROR_SHIFT_Y, amount, x, y, mean, var);
+        return shifted(m, how, k, x, y, out);
     bool swaps = kind >= ERROR_SWAP_RB && kind <= ERROR_SWAP_GB;
+    bool moves = kind >= ERROR_FLIP_X && kind <= ERROR_TRANSPOSE;
     size_t p = source(m, kind, x, y);
     for (size_t c = 0; c < 3; c++) {
-        size_t i = p + (swaps ? (size_t)from[kind][c] : c);
-        double own = moments_mean(m->side[1], i), v = variance(m, 1, i), slope = 1;
-        mean[c] = own;
+        struct value v = moves ? value_of(m, 1, p + c) : own[swaps ? from[kind][c] : c];
+        double slope = 1, mean = v.mean;
         if (kind == ERROR_SCALE) {
-            slope = exp(amount);
-            mean[c] = slope * own;
+            slope = how->factor;
+            mean = slope * v.mean;
         } else if (kind == ERROR_OFFSET) {
-            mean[c] = own + amount * m->mean;
+            mean = v.mean + how->amount * m->mean;
         } else if (kind == ERROR_GAMMA) {
-            mean[c] = own > 0 ? pow(own, exp(amount)) : 0;
-            slope = own > 0 ? exp(amount) * mean[c] / own : 0;
-        } else if (kind == ERROR_CLAMP && own > 1) {
-            mean[c] = 1;
+            mean = v.mean > 0 ? pow(v.mean, how->factor) : 0;
+            slope = v.mean > 0 ? how->factor * mean / v.mean : 0;
+        } else if (kind == ERROR_CLAMP && v.mean > 1) {
+            mean = 1;
             slope = 0;
         }
-        var[c] = slope * slope * v;
+        out[c] = (struct value){mean, slope * slope * v.var};
     }
     return true;
 }
 
-static void add_block(const struct images *m, enum error_mode_kind kind, double amount, int column,
-                      int row, struct excess *out)
+/* Block number k of the sample, whose first pixel is number *first; then that of the next. */
+static void add_block(const struct images *m, const struct change *how, size_t k, int column,
+                      int row, size_t *first, struct excess *out)
 {
     const double *weight = m->weight + 3 * ((size_t)row * (size_t)m->columns + (size_t)column);
-    double before[3] = {0}, after[3] = {0}, v_before[3] = {0}, v_after[3] = {0}, mean[3], var[3];
+    double before[3] = {0}, after[3] = {0}, v_before[3] = {0}, v_after[3] = {0};
     int num = 0;
     for (int y = row * BLOCK; y < (row + 1) * BLOCK && y < m->side[0]->height; y++)
         for (int x = column * BLOCK; x < (column + 1) * BLOCK && x < m->side[0]->width; x++) {
+            const struct value *a = how->sample->side[0][*first], *b = how->sample->side[1][*first];
+            struct value new[3];
             out->of++;
-            if (!changed(m, kind, amount, x, y, mean, var))
+            ++*first;
+            if (!changed(m, how, k, x, y, b, new))
                 continue;
             num++;
-            for (size_t c = 0, i = at(m, x, y); c < 3; c++, i++) {
-                double d = moments_mean(m->side[0], i) - moments_mean(m->side[1], i),
-                       va = variance(m, 0, i), r = moments_mean(m->side[0], i) - mean[c],
-                       vb = variance(m, 1, i);
+            for (size_t c = 0; c < 3; c++) {
+                double d = a[c].mean - b[c].mean, va = a[c].var, r = a[c].mean - new[c].mean,
+                       vb = b[c].var;
                 out->before[0] += weight[c] * (d * d - va - vb);
-                out->after[0] += weight[c] * (r * r - va - var[c]);
+                out->after[0] += weight[c] * (r * r - va - new[c].var);
                 before[c] += d;
                 after[c] += r;
                 v_before[c] += va + vb;
-                v_after[c] += va + var[c];
+                v_after[c] += va + new[c].var;
             }
         }
     out->num[0] += (size_t)num;
@@ -139,14 +185,58 @@ static void add_block(const struct images *m, enum error_mode_kind kind, double 
 }
 
 static struct excess measure(const struct images *m, enum error_mode_kind kind, double amount,
-                             size_t enough)
+                             const struct sample *s)
 {
+    const struct change how = {kind, amount, exp(amount), s};
     struct excess e = {.of = 0};
-    size_t pixels = (size_t)m->side[0]->width * (size_t)m->side[0]->height;
-    int step = 1 + (int)(pixels / enough);
-    for (int k = step / 2; k < m->columns * m->rows; k += step)
-        add_block(m, kind, amount, k % m->columns, k / m->columns, &e);
+    size_t first = 0, k = 0;
+    for (int block = s->step / 2; block < m->columns * m->rows; block += s->step)
+        add_block(m, &how, k++, block % m->columns, block / m->columns, &first, &e);
     return e;
+}
+
+static bool open_sample(const struct images *m, size_t enough, struct sample *s)
+{
+    const size_t pixels = (size_t)m->side[0]->width * (size_t)m->side[0]->height;
+    s->step = 1 + (int)(pixels / enough);
+    const size_t blocks = (size_t)(m->columns * m->rows / s->step + 1);
+    s->side[0] = malloc(2 * blocks * BLOCK * BLOCK * sizeof *s->side[0]);
+    if (s->side[0] == NULL)
+        return false;
+    s->side[1] = s->side[0] + blocks * BLOCK * BLOCK;
+    size_t first = 0;
+    for (int block = s->step / 2; block < m->columns * m->rows; block += s->step) {
+        const int left = block % m->columns * BLOCK, top = block / m->columns * BLOCK;
+        for (int y = top; y < top + BLOCK && y < m->side[0]->height; y++)
+            for (int x = left; x < left + BLOCK && x < m->side[0]->width; x++, first++)
+                for (size_t c = 0; c < 3; c++)
+                    for (int side = 0; side < 2; side++)
+                        s->side[side][first][c] = value_of(m, side, at(m, x, y) + c);
+    }
+    return true;
+}
+
+/* Of the blocks of a sample, for shifts of one kind. */
+static bool open_strips(const struct images *m, enum error_mode_kind kind, struct sample *s)
+{
+    const bool down = kind == ERROR_SHIFT_Y;
+    const int last = (down ? m->side[1]->height : m->side[1]->width) - 1;
+    size_t k = 0;
+    s->strips = malloc((size_t)(m->columns * m->rows / s->step + 1) * sizeof *s->strips);
+    for (int block = s->step / 2; s->strips != NULL && block < m->columns * m->rows;
+         block += s->step, k++) {
+        const int left = block % m->columns * BLOCK, top = block / m->columns * BLOCK;
+        for (int along = 0; along < STRIP; along++)
+            for (int across = 0; across < BLOCK; across++) {
+                int i = (down ? top : left) - REACH + along, j = (down ? left : top) + across;
+                if (i < 0 || i > last || j >= (down ? m->side[1]->width : m->side[1]->height))
+                    continue;
+                for (size_t c = 0; c < 3; c++)
+                    s->strips[k][along * BLOCK + across][c] =
+                        value_of(m, 1, (down ? at(m, j, i) : at(m, i, j)) + c);
+            }
+    }
+    return s->strips != NULL;
 }
 
 static double standard_errors(const struct excess *e, int k)
@@ -157,9 +247,9 @@ static double standard_errors(const struct excess *e, int k)
 /* Judged where the difference stands out most from noise. If it stands out nowhere (noise that was guessed from the
  * difference takes much of it for its own), noise and all: no change removes noise. -1: few pixels have a partner. */
 static double removed_by(const struct images *m, enum error_mode_kind kind, double amount,
-                         size_t enough)
+                         const struct sample *sample)
 {
-    const struct excess e = measure(m, kind, amount, enough);
+    const struct excess e = measure(m, kind, amount, sample);
     if (2 * e.num[0] < e.of || !(e.all_before > 0))
         return -1;
     if (!m->stands_out)
@@ -169,7 +259,7 @@ static double removed_by(const struct images *m, enum error_mode_kind kind, doub
 }
 
 /* The amount that removes most: on a grid, then between its neighbours by thirds. */
-static double fit(const struct images *m, enum error_mode_kind kind)
+static bool fit(struct images *m, enum error_mode_kind kind, double *amount)
 {
     static const double reach[NUM_ERROR_MODES] = {[ERROR_SCALE] = 2,
                                                   [ERROR_OFFSET] = 1,
@@ -177,8 +267,11 @@ static double fit(const struct images *m, enum error_mode_kind kind)
                                                   [ERROR_SHIFT_X] = GRID,
                                                   [ERROR_SHIFT_Y] = GRID};
     double step = reach[kind] / GRID, best = 0, most = -INFINITY;
+    const struct sample *few = &m->few;
+    if ((kind == ERROR_SHIFT_X || kind == ERROR_SHIFT_Y) && !open_strips(m, kind, &m->few))
+        return false;
     for (int k = -GRID; k <= GRID; k++) {
-        double r = removed_by(m, kind, k * step, ENOUGH_TO_FIT);
+        double r = removed_by(m, kind, k * step, few);
         if (r > most) {
             most = r;
             best = k * step;
@@ -187,13 +280,15 @@ static double fit(const struct images *m, enum error_mode_kind kind)
     double lo = best - step, hi = best + step;
     for (int i = 0; i < REFINE; i++) {
         double third = (hi - lo) / 3;
-        if (removed_by(m, kind, lo + third, ENOUGH_TO_FIT) <
-            removed_by(m, kind, hi - third, ENOUGH_TO_FIT))
+        if (removed_by(m, kind, lo + third, few) < removed_by(m, kind, hi - third, few))
             lo += third;
         else
             hi -= third;
     }
-    return (lo + hi) / 2;
+    free(m->few.strips);
+    m->few.strips = NULL;
+    *amount = (lo + hi) / 2;
+    return true;
 }
 
 static struct hint describe(enum error_mode_kind kind, double amount, double share)
@@ -228,7 +323,8 @@ static bool open_images(const struct moments *a, const struct moments *b, struct
            values = 3 * (size_t)b->width * (size_t)b->height;
     double mean_var = 0, mean_square = 0;
     m->weight = calloc(4 * blocks, sizeof *m->weight);
-    if (m->weight == NULL)
+    if (m->weight == NULL || !open_sample(m, ENOUGH_TO_FIT, &m->few) ||
+        !open_sample(m, ENOUGH, &m->many))
         return false;
     double *num = m->weight + 3 * blocks;
     for (size_t i = 0; i < values; i++) {
@@ -244,9 +340,17 @@ static bool open_images(const struct moments *a, const struct moments *b, struct
     for (size_t k = 0; k < 3 * blocks; k++)
         m->weight[k] =
             1 / (fmax(m->weight[k] / num[k / 3], least * mean_var) + dust * mean_square + 1e-300);
-    const struct excess e = measure(m, ERROR_SCALE, 0, ENOUGH);
+    const struct excess e = measure(m, ERROR_SCALE, 0, &m->many);
     m->stands_out = fmax(standard_errors(&e, 0), standard_errors(&e, 1)) > certain;
     return true;
+}
+
+static void close_images(struct images *m)
+{
+    free(m->weight);
+    free(m->few.side[0]);
+    free(m->few.strips);
+    free(m->many.side[0]);
 }
 
 bool hint_add(const struct moments *a, const struct moments *b, struct comparison *c, struct err *e)
@@ -260,19 +364,21 @@ bool hint_add(const struct moments *a, const struct moments *b, struct compariso
     double most = enough_removed - clearly;
     if (c->verdict == VERDICT_EQUIVALENT)
         return true;
-    if (!open_images(a, b, &m))
-        return err_set(e, "out of memory for the hint of %d x %d pixels", a->width, a->height);
-    for (int i = 0; i < NUM_ERROR_MODES; i++) {
+    bool ok = open_images(a, b, &m);
+    for (int i = 0; ok && i < NUM_ERROR_MODES; i++) {
         if (order[i] == ERROR_TRANSPOSE && a->width != a->height)
             continue;
-        double amount = error_mode_has_amount(order[i]) ? fit(&m, order[i]) : 0,
-               share = fmin(1, removed_by(&m, order[i], amount, ENOUGH));
+        double amount = 0;
+        ok = !error_mode_has_amount(order[i]) || fit(&m, order[i], &amount);
+        double share = ok ? fmin(1, removed_by(&m, order[i], amount, &m.many)) : 0;
         if (share >= most + clearly) {
             most = share;
             c->hint = describe(order[i], amount, share);
         }
     }
-    free(m.weight);
+    close_images(&m);
+    if (!ok)
+        return err_set(e, "out of memory for the hint of %d x %d pixels", a->width, a->height);
     size_t used = strlen(c->reason);
     if (c->hint.name != NULL && c->hint.unit[0] == '\0')
         snprintf(c->reason + used, sizeof c->reason - used, "; looks like %s, %.0f %% of it",

@@ -11,10 +11,10 @@ enum { SMALLEST_BAND = 32 }; /* rows */
 const double float_tolerance = 1e-5;
 const double luminance_weight[3] = {0.2126, 0.7152, 0.0722};
 
-struct estimate pyramid_pixel_estimate(const struct moments *m, size_t pixel, int channel)
+static inline struct estimate estimate(const struct moments *m, bool exact, size_t pixel,
+                                       int channel)
 {
     double n = moments_n(m, pixel);
-    bool exact = strcmp(m->unit, "exact") == 0;
     assert(exact || n >= 3);
     double v_scale = exact ? 0 : 1 / (n * (n - 1));
     double k_scale = exact ? 0 : v_scale / (n - 2);
@@ -37,6 +37,16 @@ struct estimate pyramid_pixel_estimate(const struct moments *m, size_t pixel, in
     struct estimate est = pyramid_estimate_from(sum, deviation * deviation, root * root * root, n);
     est.tolerance = rounding;
     return est;
+}
+
+static bool is_exact(const struct moments *m)
+{
+    return strcmp(m->unit, "exact") == 0;
+}
+
+struct estimate pyramid_pixel_estimate(const struct moments *m, size_t pixel, int channel)
+{
+    return estimate(m, is_exact(m), pixel, channel);
 }
 
 void pyramid_add_pixel(struct cell *dst, const struct estimate *a, const struct estimate *b)
@@ -74,9 +84,14 @@ static double log10_one_value_each(double n, double m)
     return (k * log(k / all) + m * log(m / all)) / log(10);
 }
 
+static bool is_observed(const struct moments *m)
+{
+    return strcmp(m->unit, "sample") == 0 || strcmp(m->unit, "replicate") == 0;
+}
+
 static bool one_value(const struct moments *m, size_t pixel, int channel)
 {
-    bool observed = strcmp(m->unit, "sample") == 0 || strcmp(m->unit, "replicate") == 0;
+    bool observed = true;
     int first = channel < CHANNEL_LUMINANCE ? channel : 0;
     int last = channel < CHANNEL_LUMINANCE ? channel : 2;
     for (int c = first; observed && c <= last; c++) {
@@ -91,13 +106,15 @@ static bool one_value(const struct moments *m, size_t pixel, int channel)
 static void fill_pixels(const struct moments *a, const struct moments *b, int channel,
                         struct pyramid_level *level)
 {
-    size_t pixels = (size_t)level->nx * (size_t)level->ny;
+    const size_t pixels = (size_t)level->nx * (size_t)level->ny;
+    const bool exact_a = is_exact(a), exact_b = is_exact(b);
+    const bool observed = is_observed(a) && is_observed(b);
     for (size_t p = 0; p < pixels; p++) {
-        struct estimate ea = pyramid_pixel_estimate(a, p, channel),
-                        eb = pyramid_pixel_estimate(b, p, channel);
+        struct estimate ea = estimate(a, exact_a, p, channel),
+                        eb = estimate(b, exact_b, p, channel);
         level->cell[p] = (struct cell){0};
         pyramid_add_pixel(&level->cell[p], &ea, &eb);
-        if (one_value(a, p, channel) && one_value(b, p, channel))
+        if (observed && one_value(a, p, channel) && one_value(b, p, channel))
             level->cell[p].log10_alike =
                 fmin(log10_one_value_each(moments_n(a, p), moments_n(b, p)),
                      log10_one_value_each(moments_n(b, p), moments_n(a, p)));
@@ -112,19 +129,19 @@ static int least(int a, int b)
 size_t pyramid_parent(const struct pyramid *p, int fine, int coarse, size_t i)
 {
     const struct pyramid_level *f = &p->level[fine], *c = &p->level[coarse];
-    int factor = c->side / f->side;
-    int x = least((int)(i % (size_t)f->nx) / factor, c->nx - 1);
-    int y = least((int)(i / (size_t)f->nx) / factor, c->ny - 1);
-    return (size_t)y * (size_t)c->nx + (size_t)x;
+    return pyramid_around(c, c->side / f->side, (int)(i % (size_t)f->nx), (int)(i / (size_t)f->nx));
 }
 
 /* Every region of a level is the sum of the regions of level `from` that lie in it; that one's side
  * divides its own. */
 static void fill_from(struct pyramid *p, int from, int level)
 {
-    size_t regions = (size_t)p->level[from].nx * (size_t)p->level[from].ny;
-    for (size_t i = 0; i < regions; i++)
-        add_cell(&p->level[level].cell[pyramid_parent(p, from, level, i)], &p->level[from].cell[i]);
+    const struct pyramid_level *fine = &p->level[from], *coarse = &p->level[level];
+    const int factor = coarse->side / fine->side;
+    const struct cell *src = fine->cell;
+    for (int y = 0; y < fine->ny; y++)
+        for (int x = 0; x < fine->nx; x++)
+            add_cell(&coarse->cell[pyramid_around(coarse, factor, x, y)], src++);
 }
 
 int pyramid_tiles(int length, int tile)
@@ -154,11 +171,18 @@ struct pyramid pyramid_levels(int width, int height, int tile)
     }
 }
 
-/* Zeroed. */
-static bool alloc_cells(struct pyramid *p, struct err *e)
+/* Zeroed, in the memory of `old` if there is enough of that. */
+static bool alloc_cells(struct pyramid *p, struct pyramid old, struct err *e)
 {
-    /* NOLINTNEXTLINE(clang-analyzer-optin.portability.UnixAPI): an image has a pixel. */
-    p->cells = huge_calloc(pyramid_regions(p), sizeof *p->cells);
+    p->room = pyramid_regions(p);
+    if (old.room < p->room) {
+        pyramid_free(&old);
+        p->cells = huge_calloc(p->room, sizeof *p->cells);
+    } else {
+        p->cells = old.cells;
+        memset(p->cells, 0, p->room * sizeof *p->cells);
+        p->room = old.room;
+    }
     if (p->cells == NULL)
         return err_set(e, "out of memory for the regions of %d x %d pixels", p->width, p->height);
     struct cell *next = p->cells;
@@ -169,20 +193,28 @@ static bool alloc_cells(struct pyramid *p, struct err *e)
     return true;
 }
 
+bool pyramid_rebuild(const struct moments *a, const struct moments *b, int channel, int tile,
+                     struct pyramid *p, struct err *e)
+{
+    assert(a->width == b->width && a->height == b->height);
+    const struct pyramid old = *p;
+    *p = pyramid_levels(a->width, a->height, tile);
+    if (!alloc_cells(p, old, e))
+        return false;
+    for (int i = 0; i < p->num_levels; i++) {
+        if (p->level[i].side == 1)
+            fill_pixels(a, b, channel, &p->level[i]);
+        else /* a tile that is no power of two is not made of the level below it */
+            fill_from(p, i == p->tile_level ? 0 : i - 1, i);
+    }
+    return true;
+}
+
 bool pyramid_build(const struct moments *a, const struct moments *b, int channel, int tile,
                    struct pyramid *out, struct err *e)
 {
-    assert(a->width == b->width && a->height == b->height);
-    *out = pyramid_levels(a->width, a->height, tile);
-    if (!alloc_cells(out, e))
-        return false;
-    for (int i = 0; i < out->num_levels; i++) {
-        if (out->level[i].side == 1)
-            fill_pixels(a, b, channel, &out->level[i]);
-        else /* a tile that is no power of two is not made of the level below it */
-            fill_from(out, i == out->tile_level ? 0 : i - 1, i);
-    }
-    return true;
+    *out = (struct pyramid){.width = 0};
+    return pyramid_rebuild(a, b, channel, tile, out, e);
 }
 
 int pyramid_band(const struct pyramid *levels)
@@ -200,7 +232,7 @@ bool pyramid_above(const struct pyramid *levels, struct pyramid *out, struct err
     out->num_levels -= levels->tile_level;
     memmove(out->level, levels->level + levels->tile_level,
             (size_t)out->num_levels * sizeof *out->level);
-    return alloc_cells(out, e);
+    return alloc_cells(out, (struct pyramid){0}, e);
 }
 
 void pyramid_sum_up(struct pyramid *above)

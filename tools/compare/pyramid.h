@@ -68,6 +68,7 @@ struct pyramid {
     int tile_level; /* its side is the reporting tile */
     struct pyramid_level level[PYRAMID_LEVELS];
     struct cell *cells; /* of all levels */
+    size_t room;        /* for so many */
 };
 
 /* Reporting tiles along `length` pixels, at least 1: the last has from 1/2 to 3/2 of a tile's pixels, or all. */
@@ -79,6 +80,9 @@ struct pyramid pyramid_levels(int width, int height, int tile);
 /* Same sizes. Fails only out of memory. Release with pyramid_free(). */
 bool pyramid_build(const struct moments *a, const struct moments *b, int channel, int tile,
                    struct pyramid *out, struct err *e) __attribute__((warn_unused_result));
+/* The same in the memory of one that was built before, or is zero. */
+bool pyramid_rebuild(const struct moments *a, const struct moments *b, int channel, int tile,
+                     struct pyramid *p, struct err *e) __attribute__((warn_unused_result));
 void pyramid_free(struct pyramid *p);
 
 /* The same in two parts, in less memory. An image is cut from the top into bands of so many rows, the last of up to twice as
@@ -101,5 +105,13 @@ struct rect {
 struct rect pyramid_rect(const struct pyramid *p, int level, size_t i);
 /* The region of level `coarse` in which region i of level `fine` lies; the finer side divides the other. */
 size_t pyramid_parent(const struct pyramid *p, int fine, int coarse, size_t i);
+/* The same of the region in column x and row y of the finer one, whose side is that of `coarse` over `factor`. */
+static inline size_t pyramid_around(const struct pyramid_level *coarse, int factor, int x, int y)
+{
+    int column = x / factor, row = y / factor;
+    column = column < coarse->nx ? column : coarse->nx - 1;
+    row = row < coarse->ny ? row : coarse->ny - 1;
+    return (size_t)row * (size_t)coarse->nx + (size_t)column;
+}
 
 #endif

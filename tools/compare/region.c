@@ -99,6 +99,30 @@ static double skew_factor(double skew, double x)
     return skew * x * x * x / 3;
 }
 
+static double larger(double a, double b)
+{
+    return a > b ? a : b;
+}
+
+/* At the smaller of the critical values of an image and of its regions, as far as t is beyond z. */
+static bool is_beyond(const struct judge *j, const struct cell *cell, double limit)
+{
+    const double v = cell->va + cell->vb, a = j->z_guard[STATISTIC_IMAGE],
+                 b = j->z_guard[STATISTIC_PYRAMID],
+                 least = float_tolerance * larger(cell->a, cell->b);
+    return v > least * least && skew_factor(skew_of(cell, v), a < b ? a : b) > limit;
+}
+
+bool region_is_skewed(const struct judge *j, const struct cell *cell)
+{
+    return is_beyond(j, cell, skew_limit);
+}
+
+bool region_is_hopeless(const struct judge *j, const struct cell *cell)
+{
+    return is_beyond(j, cell, skew_limit_raised);
+}
+
 /* t is beyond z: most small regions fail already there. */
 static bool is_within(const struct judge *j, const struct measured *m, double skew, double limit,
                       double gx)
@@ -198,6 +222,17 @@ double region_t(const struct measured *m)
     if (m->noise_free)
         return fabs(m->d) <= m->tolerance ? 0 : copysign(largest_t, m->d);
     return fmin(largest_t, fmax(-largest_t, m->d / sqrt(m->v)));
+}
+
+double region_pixel_t(const struct judge *j, const struct cell *cell, double *relative)
+{
+    const double size = larger(cell->a, cell->b), least = float_tolerance * size;
+    struct measured m = {.d = cell->a - cell->b,
+                         .tolerance = float_tolerance * size + cell->tolerance,
+                         .v = cell->va + cell->vb};
+    m.noise_free = m.v <= least * least;
+    *relative = m.d / larger(cell->b, j->floor);
+    return region_t(&m);
 }
 
 /* *x: quantile of alpha less the factor that skewness may put on it; false if that factor is too large to be trusted. */

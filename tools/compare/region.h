@@ -43,6 +43,13 @@ struct measured {
 
 struct measured region_measure(const struct judge *j, const struct cell *cell, struct rect r);
 
+/* Whether region_is_normal(), or region_testable(), will be false because of the skewness alone: most small regions fail
+ * there. False says nothing. */
+bool region_is_skewed(const struct judge *j, const struct cell *cell);
+bool region_is_hopeless(const struct judge *j, const struct cell *cell);
+/* The same as from region_measure() of one pixel: region_t() and the relative difference. */
+double region_pixel_t(const struct judge *j, const struct cell *cell, double *relative);
+
 /* The same for sums over the image with weights w, which may be negative: unit = sum |w| unit, size =
  * sum |w| max(A, B). A bias inside the margin of a tile in each pixel is inside the margin of this. */
 struct measured region_measure_weighted(const struct judge *j, const struct cell *cell, double unit,
