@@ -282,6 +282,17 @@ void golden_inspect(const char *golden_dir, const struct suite_scene *scene,
     json_decref(all);
 }
 
+bool golden_is_there(const char *golden_dir, const struct suite_scene *scene,
+                     const struct suite_reference *ref)
+{
+    struct err ignored;
+    json_t *all =
+        load_manifest(find_place(golden_dir, scene->name, ref->engine).manifest.s, &ignored);
+    const bool there = all == NULL || json_is_object(json_object_get(all, ref->engine));
+    json_decref(all);
+    return there;
+}
+
 void golden_free(struct golden *g)
 {
     moments_free(&g->m);

@@ -78,6 +78,9 @@ struct golden {
 void golden_inspect(const char *golden_dir, const struct suite_scene *scene,
                     const struct suite_reference *ref, struct golden *out);
 void golden_free(struct golden *g);
+/* False where golden_inspect() would say GOLDEN_MISSING; the image is not looked at. */
+bool golden_is_there(const char *golden_dir, const struct suite_scene *scene,
+                     const struct suite_reference *ref);
 const char *golden_state_name(enum golden_state state);
 /* "scene/engine" of each stored image or manifest entry that the suite has no reference for: the
  * members of a new object. Empty if the directory does not exist. */

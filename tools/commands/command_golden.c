@@ -112,16 +112,6 @@ static bool check_names(const struct settings *s, const struct suite *suite, str
     return true;
 }
 
-static bool has_candidate(const struct settings *s, const struct suite_scene *scene,
-                          const struct suite_reference *ref)
-{
-    struct golden g;
-    golden_inspect(s->opt.from_dir, scene, ref, &g);
-    bool there = g.state != GOLDEN_MISSING;
-    golden_free(&g);
-    return there;
-}
-
 static bool is_current(const struct settings *s, const struct suite_scene *scene,
                        const struct suite_reference *ref)
 {
@@ -205,7 +195,7 @@ static int approve_all(const struct settings *s, const struct suite *suite, stru
     for (int i = 0; (ref = rendered_reference(suite, i, &scene)) != NULL; i++) {
         /* Under --all a reference that is up to date needs no candidate. */
         if (!is_selected(s, scene, ref) ||
-            (s->all && !has_candidate(s, scene, ref) && is_current(s, scene, ref)))
+            (s->all && !golden_is_there(s->opt.from_dir, scene, ref) && is_current(s, scene, ref)))
             continue;
         struct err why = {0};
         enum approval done = approve(&opt, scene, ref, stdout, &why);
@@ -253,7 +243,7 @@ static int compare_all(const struct settings *s, const struct suite *suite, stru
     if (s->num_names > 0 && !check_names(s, suite, e))
         return EXIT_NOT_JUDGED;
     for (int i = 0; (ref = rendered_reference(suite, i, &scene)) != NULL; i++)
-        selected += is_selected(s, scene, ref) && has_candidate(s, scene, ref);
+        selected += is_selected(s, scene, ref) && golden_is_there(s->opt.from_dir, scene, ref);
     if (selected == 0) {
         err_set(e, "no candidates in %s: `assay golden render` makes them", s->opt.from_dir);
         return EXIT_NOT_JUDGED;
@@ -262,7 +252,7 @@ static int compare_all(const struct settings *s, const struct suite *suite, stru
     approve_compare_heading(stdout);
     for (int i = 0; (ref = rendered_reference(suite, i, &scene)) != NULL; i++) {
         struct err why = {0};
-        if (!is_selected(s, scene, ref) || !has_candidate(s, scene, ref))
+        if (!is_selected(s, scene, ref) || !golden_is_there(s->opt.from_dir, scene, ref))
             continue;
         if (!approve_compare(&opt, scene, ref, stdout, &verdict, &why)) {
             printf("%-20s  not compared: %s\n", scene->name, why.msg);
