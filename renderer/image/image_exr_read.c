@@ -214,11 +214,12 @@ static exr_result_t start_reading(struct image_reader *r)
         return result;
     const int rows = r->band < r->head.height ? r->band : r->head.height;
     const size_t floats = (size_t)rows * (size_t)r->head.width * (size_t)r->head.channels;
-    r->rows = malloc(floats * sizeof *r->rows);
+    const size_t bytes = floats * sizeof *r->rows;
+    r->rows = malloc(bytes);
     bool ok = r->rows != NULL;
     if (ok && !r->tiled && !r->half &&
         (compression == EXR_COMPRESSION_ZIP || compression == EXR_COMPRESSION_ZIPS)) {
-        r->packed = malloc(floats * sizeof *r->rows);
+        r->packed = malloc(bytes);
         r->zip = exr_zip_new(r->head.width, r->head.channels, NULL, rows);
         ok = r->packed != NULL && r->zip != NULL;
     }

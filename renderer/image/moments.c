@@ -357,7 +357,7 @@ static bool read_rows(struct image_reader *r, const char *path, const int at[10]
         if (rows == NULL)
             return false;
         for (int k = 0; k < num; k++)
-            if (!take_row(path, m, at, (size_t)(y + k), rows + (size_t)k * size, e))
+            if (!take_row(path, m, at, (size_t)y + (size_t)k, rows + (size_t)k * size, e))
                 return false;
         if (image != NULL)
             image_put_rows(image, y, rows, num);

@@ -175,7 +175,7 @@ struct pyramid pyramid_levels(int width, int height, int tile)
 static bool alloc_cells(struct pyramid *p, struct pyramid old, struct err *e)
 {
     p->room = pyramid_regions(p);
-    if (old.room < p->room) {
+    if (old.cells == NULL || old.room < p->room) {
         pyramid_free(&old);
         p->cells = huge_calloc(p->room, sizeof *p->cells);
     } else {
