@@ -61,7 +61,7 @@ def main():
     out += ["", "## What each level is"] + LEVELS.rstrip().split("\n")
     out += ["", f"Truth: Cycles, {100 * MARGIN_GLOBAL:g} % of the image ({100 * MARGIN_GLOBAL_DARK:g} % where no sky shines), {100 * MARGIN_TILE:g} % of a tile. POV-Ray has no rough metals, and each scene has one.",
             "The mirrors of the depth meter reflect all light: no path ends by roulette there, so that a pixel has no noise.",
-            "Not in the array: textures, which the loader does not have, and 1e6 triangles, whose dump for Cycles alone is 100 MB.",
+            "Not in the array: textures (29_textures has them) and 1e6 triangles, whose dump for Cycles alone is 100 MB.",
             "", f"## Which scene holds which pair: {len(pairs) - len(missing)} of {len(pairs)}", ""]
     out += ["In no scene: " + "; ".join(f"{a} with {b}" for _, a, _, b in missing) + ".",
             "A sphere scaled unevenly is no sphere, and refused. Cycles cannot light its random facets, of which Beckmann's are made,",

@@ -49,7 +49,7 @@ struct suite_scene {
     bool is_opaque;                     /* not COLLADA: only an engine with the format "file" reads it */
     char environment[4096];             /* path of an .exr or .hdr; empty if there is none */
     double lens_radius, focal_distance; /* as of struct camera; 0 and 0: pinhole */
-    char sha256[65]; /* lower-case hex: of the .dae; with an environment or a lens, of a text that
+    char sha256[65]; /* lower-case hex: of the .dae; with an environment, a lens or other files, of a text that
                         holds that, the environment's, the lens and the files that it uses */
     char title[128], detects[512], blind_to[512];
     char convention[512]; /* where correct renderers may differ; empty: nowhere */

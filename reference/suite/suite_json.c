@@ -110,6 +110,20 @@ static bool read_environment(const struct json_node *n, struct suite_scene *s, s
            err_set(e, "%s: path too long", name);
 }
 
+/* Files beside the .json, of which suite.c makes a part of the scene's hash. */
+static bool check_uses(const struct json_node *n, struct err *e)
+{
+    const json_t *list = json_object_get(n->object, "uses");
+    if (list != NULL && !json_is_array(list))
+        return err_set(e, "%s: 'uses' is not a list of files", n->file);
+    for (size_t i = 0; i < json_array_size(list); i++) {
+        const char *name = json_string_value(json_array_get(list, i));
+        if (name == NULL || name[0] == '\0' || strchr(name, '/') != NULL)
+            return err_set(e, "%s: 'uses' [%zu] is not a file beside it", n->file, i);
+    }
+    return true;
+}
+
 static bool read_lens(const struct json_node *n, struct suite_scene *s, struct err *e)
 {
     if (json_object_get(n->object, "lens_radius") == NULL &&
@@ -171,7 +185,7 @@ static bool read_variants(const struct json_node *n, struct suite_scene *s, stru
 
 static bool read_consistency(const struct json_node *n, struct suite_scene *s, struct err *e)
 {
-    static const char *const keys[] = {"renders", "spp",   "margin", "noise_margin",
+    static const char *const keys[] = {"renders",  "spp",   "margin", "noise_margin",
                                        "adaptive", "parts", NULL};
     static const char *const adaptive_keys[] = {"batch", "tolerance", "spp", NULL};
     struct json_node c = {n->file, "consistency.", NULL};
@@ -240,7 +254,8 @@ bool suite_json_read(const char *file, struct suite_scene *s, struct err *e)
                                        "lens_radius", "focal_distance",
                                        "references",  "not_expressible",
                                        "variants",    "consistency",
-                                       "convention",  NULL};
+                                       "convention",  "uses",
+                                       NULL};
     static const char *const keys_9x[] = {
         "title", "detects", "blind_to",    "width",       "height",         "depth",         "spp",
         "tile",  "expect",  "environment", "lens_radius", "focal_distance", "references_of", NULL};
@@ -266,8 +281,8 @@ bool suite_json_read(const char *file, struct suite_scene *s, struct err *e)
     if (!verdict_parse(expect, &s->expect) || s->expect != wanted)
         return err_set(e, "%s: 'expect' is '%s', but scenes of family %c must be %s", file, expect,
                        s->name[0], verdict_name(wanted));
-    if (!read_environment(&n, s, e) || !read_lens(&n, s, e) || !read_variants(&n, s, e) ||
-        !read_consistency(&n, s, e))
+    if (!check_uses(&n, e) || !read_environment(&n, s, e) || !read_lens(&n, s, e) ||
+        !read_variants(&n, s, e) || !read_consistency(&n, s, e))
         return false;
     if (must_differ)
         return json_get_text(&n, "references_of", s->references_of, sizeof s->references_of, e);

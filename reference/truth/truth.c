@@ -7,6 +7,7 @@
 #include "truth_mirrors_and_glass.h"
 #include "truth_sky.h"
 #include "truth_sun.h"
+#include "truth_texture.h"
 #include "truth_snell_window.h"
 
 #include <math.h>
@@ -43,7 +44,7 @@ static const struct truth_kind furnaces[] = {{"furnace", fill_furnace}, {NULL, N
 
 static const struct truth_kind *const families[] = {
     furnaces,           truth_one_lamp, truth_several_lamps, truth_lens, truth_mirrors_and_glass,
-    truth_snell_window, truth_ggx,      truth_sky,           truth_sun};
+    truth_snell_window, truth_ggx,      truth_sky,           truth_sun,  truth_texture};
 
 static const struct truth_kind *find_kind(const char *name)
 {

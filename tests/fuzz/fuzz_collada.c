@@ -5,6 +5,9 @@
 
 #include <math.h>
 
+/* Images are looked for beside it: those of the suite are there. */
+#define PLACE "reference/scenes/fuzz.dae"
+
 static int finite3(vec3 v)
 {
     return isfinite(v.x) && isfinite(v.y) && isfinite(v.z);
@@ -40,6 +43,17 @@ static void check_scene(const struct scene *s)
                      "a sphere's index or size is out of range");
     for (uint32_t i = 0; i < s->num_lights; i++)
         check_light(s, &s->lights[i]);
+    for (uint32_t i = 0; i < s->num_materials; i++) {
+        const struct material *m = &s->materials[i];
+        fuzz_require(m->reflectance_map <= s->num_textures && m->radiance_map <= s->num_textures &&
+                         (s->uv != NULL || !material_has_map(m)),
+                     "a map that is not there");
+    }
+    for (size_t k = 0; s->uv != NULL && k < 3 * (size_t)s->num_triangles; k++)
+        for (uint32_t i = 0; i < s->num_textures; i++) {
+            rgb c = texture_lookup(&s->textures[i], s->uv[k]);
+            fuzz_require(isfinite(c.r + c.g + c.b), "a texel that is not a number");
+        }
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
@@ -49,8 +63,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         struct scene s;
         struct camera c;
         struct err e = {""};
-        if (!collada_parse((const char *)data, size, "fuzz.dae", dialects[i], &s, &e)) {
-            fuzz_check_line(&e, "fuzz.dae");
+        if (!collada_parse((const char *)data, size, PLACE, dialects[i], &s, &e)) {
+            fuzz_check_line(&e, PLACE);
             continue;
         }
         check_scene(&s);

@@ -1,4 +1,4 @@
-/* Images from elsewhere: whatever `assay compare` might be given, by way of OpenImageIO; HDR skies by our reader. */
+/* Images from elsewhere: whatever `assay compare` or a texture might be given, by way of OpenImageIO; HDR skies by our reader. */
 #include "renderer/image/image_oiio.h"
 #include "fuzz.h"
 
@@ -14,6 +14,14 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         image_free(&im);
     else
         fuzz_check_line(&e, path);
+    /* Targa is told by its name alone. */
+    path = fuzz_file(data, size, size % 2 ? ".tga" : ".picture");
+    if (image_read_colours(path, &im, &e)) {
+        fuzz_require(im.channels == 3 && im.width > 0 && im.height > 0, "colours without shape");
+        image_free(&im);
+    } else {
+        fuzz_check_line(&e, path);
+    }
     if (image_read_hdr(path, &im, &e))
         image_free(&im);
     else

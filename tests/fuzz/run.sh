@@ -16,7 +16,7 @@ shift 2
 # The valid files that a target starts from.
 seeds() {
     case $1 in
-    collada) ls -S reference/scenes/*.dae | tail -n 30 ;;
+    collada) ls -S reference/scenes/*.dae | tail -n 30 && ls tests/fuzz/seeds/collada* ;;
     suite) ls reference/scenes/*.json ;;
     *) ls tests/fuzz/seeds/"$1"* ;;
     esac

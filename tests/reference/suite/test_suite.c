@@ -104,6 +104,39 @@ TEST(fields_are_those_of_the_file)
     suite_free(&s);
 }
 
+/* What a scene shows is in its hash: every image that one loads is among what its .json says that it uses, and vice versa. */
+TEST(images_of_textures_are_used_files)
+{
+    struct suite s;
+    size_t images = 0;
+    load_shipped(&s);
+    for (int i = 0; i < s.num_scenes; i++) {
+        struct scene scene;
+        struct camera camera;
+        struct err e = {""};
+        const json_t *uses = json_object_get(s.scene[i].json, "uses");
+        if (strcmp(s.scene[i].name, "44_mesh") == 0)
+            continue; /* a megabyte without any */
+        MUST(suite_open(&s.scene[i], &scene, &camera, &e));
+        assert_int_equal(json_array_size(uses), scene.num_images);
+        for (uint32_t k = 0; k < scene.num_images; k++, images++) {
+            bool found = false;
+            const char *file = fs_base(image_get_attr(&scene.images[k], SCENE_IMAGE_FILE));
+            for (size_t j = 0; j < json_array_size(uses); j++)
+                found |= strcmp(json_string_value(json_array_get(uses, j)), file) == 0;
+            assert_true(found);
+        }
+        scene_free(&scene);
+    }
+    assert_true(images > 0);
+    char dae[65];
+    struct err e = {""};
+    const struct suite_scene *t = suite_find(&s, "29_textures");
+    MUST(sha256_file(t->dae, dae, &e));
+    assert_string_not_equal(t->sha256, dae);
+    suite_free(&s);
+}
+
 /* Lines in which two files differ, the comment at the top aside; calls back with both. */
 static int differing_lines(const char *a, const char *b,
                            void (*check)(const char *line_a, const char *line_b))
@@ -315,6 +348,10 @@ static const struct fault {
     {false, "\"kind\"", "\"replicates\": 8, \"kind\"", "unknown key 'references.truth.replicates'"},
     {false, "\"spp\": 16", "\"spp\": 16, \"environment\": \"a/b.exr\"",
      "42_good.json: 'environment' is 'a/b.exr', not a file beside it"},
+    {false, "\"spp\": 16", "\"spp\": 16, \"uses\": \"a.png\"", "'uses' is not a list of files"},
+    {false, "\"spp\": 16", "\"spp\": 16, \"uses\": [\"a/b.png\"]",
+     "'uses' [0] is not a file beside it"},
+    {false, "\"spp\": 16", "\"spp\": 16, \"uses\": [\"none.png\"]", "none.png: No such file"},
     {false, "\"spp\": 16", "\"spp\": 16, \"environment\": 1", "'environment' is not a text"},
     {false, "\"spp\": 16", "\"spp\": 16, \"environment\": \"none.exr\"", "none.exr: No such file"},
     {false, "\"spp\": 16", "\"spp\": 16, \"lens_radius\": 0.1", "missing key 'focal_distance'"},
