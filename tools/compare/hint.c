@@ -195,11 +195,17 @@ static struct excess measure(const struct images *m, enum error_mode_kind kind, 
     return e;
 }
 
+/* At most. */
+static size_t blocks_of(const struct images *m, const struct sample *s)
+{
+    return (size_t)m->columns * (size_t)m->rows / (size_t)s->step + 1;
+}
+
 static bool open_sample(const struct images *m, size_t enough, struct sample *s)
 {
     const size_t pixels = (size_t)m->side[0]->width * (size_t)m->side[0]->height;
     s->step = 1 + (int)(pixels / enough);
-    const size_t blocks = (size_t)m->columns * (size_t)m->rows / (size_t)s->step + 1;
+    const size_t blocks = blocks_of(m, s);
     s->side[0] = malloc(2 * blocks * BLOCK * BLOCK * sizeof *s->side[0]);
     if (s->side[0] == NULL)
         return false;
@@ -222,8 +228,7 @@ static bool open_strips(const struct images *m, enum error_mode_kind kind, struc
     const bool down = kind == ERROR_SHIFT_Y;
     const int last = (down ? m->side[1]->height : m->side[1]->width) - 1;
     size_t k = 0;
-    s->strips =
-        malloc((size_t)m->columns * (size_t)m->rows / (size_t)s->step + 1 * sizeof *s->strips);
+    s->strips = malloc(blocks_of(m, s) * sizeof *s->strips);
     for (int block = s->step / 2; s->strips != NULL && block < m->columns * m->rows;
          block += s->step, k++) {
         const int left = block % m->columns * BLOCK, top = block / m->columns * BLOCK;
