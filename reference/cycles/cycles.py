@@ -62,7 +62,8 @@ def set_options(dump, spp, threads):
         auto_scrambling_distance=False, use_adaptive_sampling=False, use_denoising=False,
         light_sampling_threshold=0.0, sample_clamp_direct=0.0, sample_clamp_indirect=0.0,
         blur_glossy=0.0, caustics_reflective=True, caustics_refractive=True, film_exposure=1.0,
-        pixel_filter_type="BOX", use_auto_tile=False)
+        pixel_filter_type="GAUSSIAN" if "filter_width" in dump else "BOX",
+        filter_width=dump.get("filter_width", 1.5), use_auto_tile=False)
     put_if_any(cycles, "cycles", use_guiding=False, use_light_tree=False, use_fast_gi=False)
     set_pattern(cycles)
     # Cycles counts n + 1 scatterings at max_bounces n. Depth 0 scatters nothing: see main().

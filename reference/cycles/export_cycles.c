@@ -54,6 +54,20 @@ static json_t *camera_json(const struct scene *s, const struct camera *c, struct
                      (double)c->lens_radius, "focal_distance", (double)c->focal_distance);
 }
 
+/* Cycles' width is twelve sigmas, beyond which less than a float's rounding is cut off, and Blender's limit 10 pixels. */
+static bool check_filter(const struct pixel_filter *f, struct err *e)
+{
+    char text[PIXEL_FILTER_TEXT];
+    if (f->radius == 0 ||
+        (f->kind == PIXEL_FILTER_GAUSS && f->radius == 6 * f->sigma && f->radius <= 5))
+        return true;
+    pixel_filter_print(f, text);
+    return err_set(
+        e,
+        "Cycles: a pixel filter %s, not the box of one pixel or gauss:SIGMA:(6 SIGMA) with at most 5 pixels",
+        text);
+}
+
 bool export_cycles(const struct scene *s, const struct camera *c, int depth, const char *path,
                    struct err *e)
 {
@@ -69,17 +83,19 @@ bool export_cycles(const struct scene *s, const struct camera *c, int depth, con
     if (strlen(path) >= sizeof image - 4)
         return err_set(e, "%.64s...: path too long", path);
     snprintf(image, sizeof image, "%s.exr", path);
-    bool ok = cycles_write_textures(s, path, &textures_written, &why) &&
-              (materials = cycles_materials(s, path, &why)) != NULL &&
-              (camera = camera_json(s, c, &why)) != NULL &&
-              (meshes = cycles_meshes(s, &why)) != NULL &&
-              (environment = cycles_environment(s, image, &image_written, &why)) != NULL;
+    bool ok =
+        check_filter(&c->filter, &why) && cycles_write_textures(s, path, &textures_written, &why) &&
+        (materials = cycles_materials(s, path, &why)) != NULL &&
+        (camera = camera_json(s, c, &why)) != NULL && (meshes = cycles_meshes(s, &why)) != NULL &&
+        (environment = cycles_environment(s, image, &image_written, &why)) != NULL;
     if (ok) {
         root = json_pack("{si,si,si,si,sf,sO,sO,sO,so,so,sO}", "assay_cycles", 2, "depth", depth,
                          "width", c->width, "height", c->height, "extent", extent, "camera", camera,
                          "materials", materials, "meshes", meshes, "spheres",
                          cycles_spheres(s, c->eye), "lights", cycles_lights(s), "environment",
                          environment);
+        if (c->filter.radius > 0)
+            json_object_set_new(root, "filter_width", json_real(2 * c->filter.radius));
         ok = root != NULL && json_write_as(path, root, JSON_COMPACT | JSON_REAL_PRECISION(9), &why);
     }
     if (!ok && image_written)

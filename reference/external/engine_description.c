@@ -203,6 +203,27 @@ static bool read_channels(const struct json_node *n, struct engine *en, struct e
                    n->file);
 }
 
+/* What splats, as most do, shares samples; what draws its samples by the filter does not, and says so. Of moments, whose file
+ * says how noisy a pixel is, nobody knows how it was filled. */
+static bool read_filter(const struct json_node *n, struct engine *en, struct err *e)
+{
+    char text[PIXEL_FILTER_TEXT];
+    json_t *shared = json_object_get(n->object, "shared_samples");
+    if (json_object_get(n->object, "filter") == NULL)
+        return shared == NULL ||
+               err_set(e, "%s: 'shared_samples' is about a 'filter', which is not there", n->file);
+    if (shared != NULL && !json_is_boolean(shared))
+        return err_set(e, "%s: 'shared_samples' is neither true nor false", n->file);
+    if (!json_get_text(n, "filter", text, sizeof text, e))
+        return false;
+    if (!pixel_filter_parse(text, &en->filter, e))
+        return err_prefix(e, "%s: 'filter'", n->file);
+    en->shares_samples = shared != NULL ? json_is_true(shared) : en->filter.radius > 0;
+    return !en->shares_samples || en->output != OUTPUT_MOMENTS ||
+           err_set(e, "%s: \"output\": \"moments\" with a 'filter' needs \"shared_samples\": false",
+                   n->file);
+}
+
 static bool read_name(const struct json_node *n, struct engine *en, struct err *e)
 {
     static const char *const taken[] = {"truth", "pathtracer",
@@ -224,7 +245,7 @@ static bool read_engine(const char *path, struct engine *en, struct err *e)
         "name",       "comment",   "format",           "command", "output",
         "image",      "expresses", "depth_offset",     "spp",     "version",
         "replicates", "lens_args", "environment_args", "margin",  "channels",
-        "scale",      NULL};
+        "scale",      "filter",    "shared_samples",   NULL};
     struct json_node n = {path, "", en->json};
     int word, image = 0;
     unsigned used;
@@ -249,7 +270,7 @@ static bool read_engine(const char *path, struct engine *en, struct err *e)
         return false;
     return read_features(&n, en, e) && read_command(&n, en, e) &&
            read_optional_int(&n, "depth_offset", -1, 1, &en->depth_offset, e) &&
-           read_margin(&n, en, e) && read_channels(&n, en, e) &&
+           read_margin(&n, en, e) && read_channels(&n, en, e) && read_filter(&n, en, e) &&
            (json_object_get(en->json, "scale") == NULL ||
             json_get_number(&n, "scale", 0, 1e30, &en->scale, e)) &&
            read_optional_int(&n, "spp", 1, 1 << 24, &en->spp, e) &&

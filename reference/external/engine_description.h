@@ -12,13 +12,17 @@ struct engine {
     char file[4096]; /* the description */
     char here[4096]; /* its directory, absolute */
     char name[32];
-    const struct engine_kind *format; /* whose scene files it reads; NULL: the suite's own, "dae" or "file" */
-    bool takes_files;                 /* "file": the scene as it is, whatever it is; nobody looks into it */
+    const struct engine_kind
+        *format;      /* whose scene files it reads; NULL: the suite's own, "dae" or "file" */
+    bool takes_files; /* "file": the scene as it is, whatever it is; nobody looks into it */
     enum engine_output output;
     char image[8];    /* "exr" */
     unsigned feature; /* bits, features.h */
     /* A render for each channel, with all that the scene has in grey, as that channel is: for programs that make spectra of colours. */
     bool separate;
+    struct pixel_filter filter; /* of its images; the box of one pixel by default */
+    bool
+        shares_samples; /* a sample counts in each pixel whose filter reaches it: pixels are correlated */
     int depth_offset, spp, replicates;
     double scale; /* of its images' numbers, to be radiance */
     /* How far it may be off in every scene that is to be EQUIVALENT, whatever that scene's margins are, and why; 0: no more. */

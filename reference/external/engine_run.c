@@ -185,6 +185,8 @@ static bool fold_runs(struct engine_job *j, struct moments *m, struct err *e)
     bool check = j->independence != NULL;
     bool ok = replicate_repeats_alloc(&repeats, j->replicates, e) &&
               (!check || replicates_alloc(&seen, m->width, m->height, j->replicates, e));
+    if (j->en->shares_samples)
+        seen.sharing = pixel_filter_sharing(&j->en->filter, 2);
     for (int k = 0; ok && k < j->replicates; k++) {
         float *px = render_image(j, k, e);
         ok = px != NULL;
@@ -220,6 +222,17 @@ static void scale_moments(struct moments *m, double scale)
     }
 }
 
+/* A sum over pixels that share samples varies more than the sum of their variances: they count as noisier. */
+static void count_sharing(const struct engine *en, struct moments *m)
+{
+    const double second = pixel_filter_sharing(&en->filter, 2),
+                 third = pixel_filter_sharing(&en->filter, 3);
+    for (size_t i = 0; i < 3 * (size_t)m->width * (size_t)m->height; i++) {
+        m->m2[i] *= second;
+        m->m3[i] *= third;
+    }
+}
+
 static bool run_all(struct engine_job *j, struct moments *out, struct err *e)
 {
     char path[PATH_SIZE];
@@ -239,6 +252,8 @@ static bool run_all(struct engine_job *j, struct moments *out, struct err *e)
         strcpy(m.unit, "replicate");
         m.spp = j->spp;
         ok = ok && fold_runs(j, &m, e);
+        if (ok && j->en->shares_samples && strcmp(m.unit, "replicate") == 0)
+            count_sharing(j->en, &m);
     }
     if (ok)
         *out = m;

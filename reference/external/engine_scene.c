@@ -83,6 +83,7 @@ static bool write_channel(const struct engine *en, const struct suite_scene *sui
     assert(en->format != NULL); /* read_channels() sees to it */
     if (!suite_open(suite, &s, &c, e))
         return false;
+    c.filter = en->filter;
     bool ok = make_grey(&s, channel, e);
     if (ok && snprintf(path, PATH_SIZE, "%s/scene_%c%s", dir, "rgb"[channel],
                        en -> format -> ending) >= PATH_SIZE)
@@ -103,6 +104,7 @@ bool engine_write_scene(const struct engine *en, const struct suite_scene *suite
                err_set(e, "%s: %s", suite->dae, strerror(errno));
     if (!suite_open(suite, &s, &c, e))
         return false;
+    c.filter = en->filter;
     /* Mitsuba's count of bounces is ours plus one whoever reads the file, and so on: that is the
      * exporter's business. depth_offset is only for {depth}. */
     bool ok = check_features(en, features_of_scene(&s, &c), e);

@@ -37,6 +37,18 @@ static bool write_image(const struct writer *w, const char *ending, const struct
 static const char *const RGB_NAMES[3] = {"R", "G", "B"};
 
 /* The camera looks along +Z with +X to the left. */
+/* As check_filter() has let through. */
+static void put_filter(struct writer *w, const struct pixel_filter *f)
+{
+    static const char *const names[] = {"box", "tent", "gaussian"};
+    mitsuba_begin(w->xml, "rfilter", names[f->kind], NULL, NULL);
+    if (f->kind == PIXEL_FILTER_TENT)
+        mitsuba_real(w->xml, "float", "radius", f->radius);
+    if (f->kind == PIXEL_FILTER_GAUSS)
+        mitsuba_real(w->xml, "float", "stddev", f->sigma);
+    mitsuba_end(w->xml);
+}
+
 static void put_camera(struct writer *w)
 {
     const struct camera *c = w->c;
@@ -61,8 +73,7 @@ static void put_camera(struct writer *w)
     mitsuba_integer(w->xml, "height", c->height);
     mitsuba_text(w->xml, "string", "pixel_format", "rgb");
     mitsuba_text(w->xml, "string", "component_format", "float32");
-    mitsuba_begin(w->xml, "rfilter", "box", NULL, NULL);
-    mitsuba_end(w->xml);
+    put_filter(w, &c->filter);
     mitsuba_end(w->xml);
     mitsuba_end(w->xml);
 }
@@ -358,6 +369,19 @@ static bool put_scene(struct writer *w, int depth, struct err *e)
     return ok;
 }
 
+/* Mitsuba's box is one pixel wide, and its Gauss ends at four sigmas. */
+static bool check_filter(const struct pixel_filter *f, struct err *e)
+{
+    char text[PIXEL_FILTER_TEXT];
+    if (f->radius == 0 || f->kind == PIXEL_FILTER_TENT ||
+        (f->kind == PIXEL_FILTER_GAUSS && f->radius == 4 * f->sigma))
+        return true;
+    pixel_filter_print(f, text);
+    return err_set(
+        e, "Mitsuba: a pixel filter %s, not the box of one pixel, a tent, or gauss:SIGMA:(4 SIGMA)",
+        text);
+}
+
 bool export_mitsuba(const struct scene *s, const struct camera *c, int depth, const char *path,
                     struct err *e)
 {
@@ -369,7 +393,7 @@ bool export_mitsuba(const struct scene *s, const struct camera *c, int depth, co
     struct mitsuba_xml xml;
     struct writer w = {
         .xml = &xml, .s = s, .c = c, .stem = stem.s, .base = slash != NULL ? slash + 1 : stem.s};
-    if (!features_check_exportable("Mitsuba", s, c, e))
+    if (!features_check_exportable("Mitsuba", s, c, e) || !check_filter(&c->filter, e))
         return false;
     bool ok = mitsuba_new(&xml, e) && put_scene(&w, depth, e) && mitsuba_write(&xml, path, e);
     mitsuba_free(&xml);

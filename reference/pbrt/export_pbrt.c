@@ -28,6 +28,18 @@ static void put_point(const struct writer *w, const char *name, vec3 p)
     put3(w, "point3", name, (double)p.x, (double)p.y, (double)p.z);
 }
 
+/* pbrt's Gauss is ours: less its value at the radius. */
+static void put_filter(const struct writer *w, const struct pixel_filter *f)
+{
+    static const char *const names[] = {"box", "triangle", "gaussian"};
+    double radius = f->radius > 0 ? f->radius : 0.5;
+    fprintf(w->f, "PixelFilter \"%s\" \"float xradius\" [%.9g] \"float yradius\" [%.9g]",
+            names[f->kind], radius, radius);
+    if (f->kind == PIXEL_FILTER_GAUSS)
+        fprintf(w->f, " \"float sigma\" [%.9g]", f->sigma);
+    fputs("\n", w->f);
+}
+
 /* World to camera, which looks along +Z with +X to the right; by columns. */
 static void put_camera(const struct writer *w, const struct camera *c)
 {
@@ -52,10 +64,10 @@ static void put_camera(const struct writer *w, const struct camera *c)
                 (double)c->lens_radius, (double)c->focal_distance);
     fprintf(w->f,
             "\nFilm \"rgb\" \"integer xresolution\" [%d] \"integer yresolution\" [%d]"
-            " \"bool savefp16\" [false] \"string filename\" [\"pbrt.exr\"]\n"
-            "PixelFilter \"box\" \"float xradius\" [0.5] \"float yradius\" [0.5]\n"
-            "Sampler \"independent\" \"integer pixelsamples\" [16]\n",
+            " \"bool savefp16\" [false] \"string filename\" [\"pbrt.exr\"]\n",
             c->width, c->height);
+    put_filter(w, &c->filter);
+    fputs("Sampler \"independent\" \"integer pixelsamples\" [16]\n", w->f);
 }
 
 static bool is_one(rgb c)

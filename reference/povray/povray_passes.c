@@ -87,6 +87,8 @@ static bool check_camera(const struct scene *s, const struct camera *c, double e
         return err_set(e, "POV-Ray: an orthographic camera is not verified");
     if (c->lens_radius > 0)
         return err_set(e, "POV-Ray's depth of field is not verified: the lens must be a pinhole");
+    if (c->filter.radius > 0)
+        return err_set(e, "POV-Ray: a pixel filter other than the box of one pixel");
     if (!(extent >= MIN_EXTENT && fmax(extent, farthest) <= MAX_REACH))
         return err_set(
             e,

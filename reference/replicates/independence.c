@@ -222,24 +222,24 @@ static double square_ratio(int i, double r)
     return 1 + (double)((2 << i) * (2 << i) - 1) * r;
 }
 
-static void test_squares(struct independence *out)
+static void test_squares(struct independence *out, double sharing)
 {
     for (int i = 0; i < NUM_SQUARES; i++)
         if (square_ratio(i, out->square_r[i] - out->square_limit * out->square_se[i]) >
-            SQUARES_VARY_MOST)
+            SQUARES_VARY_MOST * sharing)
             out->square_failed = 2 << i;
 }
 
-static void judge(const struct sums *s, double alpha, struct independence *out)
+static void judge(const struct sums *s, double alpha, double sharing, struct independence *out)
 {
     double pairs = (double)s->k * (double)(s->k - 1) / 2;
     test_pairs(s, out);
     test_neighbours(s, out);
     test_batches(s, out);
-    out->limit = gsl_cdf_ugaussian_Qinv(alpha / 4 / 2);
-    out->pair_limit = gsl_cdf_ugaussian_Qinv(alpha / 4 / 2 / pairs);
-    out->square_limit = gsl_cdf_ugaussian_Qinv(alpha / 4 / NUM_SQUARES);
-    test_squares(out);
+    out->limit = sqrt(sharing) * gsl_cdf_ugaussian_Qinv(alpha / 4 / 2);
+    out->pair_limit = sqrt(sharing) * gsl_cdf_ugaussian_Qinv(alpha / 4 / 2 / pairs);
+    out->square_limit = sqrt(sharing) * gsl_cdf_ugaussian_Qinv(alpha / 4 / NUM_SQUARES);
+    test_squares(out, sharing);
     out->tested = true;
     out->passed = fabs(out->pair_z) <= out->pair_limit && fabs(out->neighbours_z) <= out->limit &&
                   fabs(out->batches_z) <= out->limit && out->square_failed == 0;
@@ -263,7 +263,7 @@ bool independence_test(const struct replicates *r, double alpha, struct independ
         for (int i = 0; i < NUM_SQUARES; i++)
             measure_square(r, 2 << i, x, sum, &out->square_r[i], &out->square_se[i]);
         if (s.blocks >= FEWEST_BLOCKS)
-            judge(&s, alpha, out);
+            judge(&s, alpha, fmax(r->sharing, 1), out);
     } else {
         err_set(e, "independence of replicates: out of memory");
     }

@@ -23,7 +23,9 @@
  *   pixels      the variance between replicates of the sum over a square of 2, 4, 8 or 16 pixels is no more than
  *               SQUARES_VARY_MOST times the sum of its pixels' variances, H0. Replicates may be independent
  *               without it, but compare_moments() takes pixels for independent: with more, its intervals
- *               would be too narrow, and tests above that take blocks to be independent are off, too. */
+ *               would be too narrow, and tests above that take blocks to be independent are off, too.
+ * Where pixels are known to share samples ("sharing"), squares may vary as much more, and limits of |z| are wider by its square
+ * root, as correlations r between blocks add at most the sum of r^2 < sum of r = sharing to the variance of T. */
 #ifndef ASSAY_INDEPENDENCE_H
 #define ASSAY_INDEPENDENCE_H
 
@@ -36,6 +38,8 @@ enum { MOST_REPLICATES = 1024, NUM_SQUARES = 4 };
 struct replicates {
     int width, height, num, capacity;
     float *luminance; /* num images of width*height */
+    double
+        sharing; /* how many times the sum of pixels' variances their sum has by a filter that is known; 0: once */
 };
 
 bool replicates_alloc(struct replicates *r, int width, int height, int count, struct err *e)

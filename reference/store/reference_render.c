@@ -49,6 +49,19 @@ static bool render_whole(const struct reference_job *job, void *ctx, struct err 
                                               w->manifest, e);
 }
 
+static bool export_only(const struct reference_job *job, void *ctx, struct err *e)
+{
+    (void)ctx;
+    return engine_export(engine_kind_of(job->ref->engine), job->scene, job->camera,
+                         job->suite->depth, fs_path("%s/scene", job->dir).s, e);
+}
+
+bool reference_is_expressible(const struct suite_scene *scene, const struct suite_reference *ref,
+                              const struct reference_options *opt, struct err *why)
+{
+    return reference_in_directory(scene, ref, opt, export_only, NULL, why);
+}
+
 bool reference_is_rendered(const struct suite_reference *ref)
 {
     return strcmp(ref->engine, "truth") != 0 && strcmp(ref->engine, "pathtracer") != 0;

@@ -20,6 +20,11 @@ bool reference_render(const struct suite_scene *scene, const struct suite_refere
 /* The same in parts, which may be made anywhere and in any order: ranges of the images that an engine's reference is folded
  * from (replicate_images.h). Not of "truth". */
 
+/* Can the engine express the scene, its filter, too? Fails with the reason. Not of "truth" and "pathtracer". */
+bool reference_is_expressible(const struct suite_scene *scene, const struct suite_reference *ref,
+                              const struct reference_options *opt, struct err *why)
+    __attribute__((warn_unused_result));
+
 /* Is it made by rendering, and stored? Not closed forms, which are computed, nor our own program, which renders each time. */
 bool reference_is_rendered(const struct suite_reference *ref);
 

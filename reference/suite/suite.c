@@ -241,6 +241,7 @@ bool suite_open(const struct suite_scene *s, struct scene *scene, struct camera 
     }
     camera->lens_radius = (float)s->lens_radius;
     camera->focal_distance = (float)s->focal_distance;
+    camera->filter = s->filter;
     return true;
 }
 

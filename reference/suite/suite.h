@@ -20,17 +20,18 @@ enum verdict {
 };
 
 struct suite_reference {
-    char engine[32];      /* of engine_table.h, with goldens, or "truth"; in a suite of one's own also "pathtracer", or the
+    char engine
+        [32]; /* of engine_table.h, with goldens, or "truth"; in a suite of one's own also "pathtracer", or the
                              name of what is stored, of any engine */
     char fidelity[16];    /* "class" in the file: "exact", "limit" (exact in the limit of its own
                              settings) or "approximate" */
     double margin_global; /* largest relative difference of the image mean that counts as equal */
     double margin_tile;   /* the same for one tile */
-    int replicates;       /* engines: images with a seed of their own; 0: as many as its description says */
-    int spp;              /* samples per pixel of one replicate (0 likewise), or */
-    int subgrid;          /* (engine_kind.subgrid) one is a box-averaged (k W) x (k H) image */
-    char kind[32];        /* truth: which closed form (truth.h) */
-    json_t *values;       /* truth: its numbers; borrowed from the suite */
+    int replicates; /* engines: images with a seed of their own; 0: as many as its description says */
+    int spp;        /* samples per pixel of one replicate (0 likewise), or */
+    int subgrid;    /* (engine_kind.subgrid) one is a box-averaged (k W) x (k H) image */
+    char kind[32];  /* truth: which closed form (truth.h) */
+    json_t *values; /* truth: its numbers; borrowed from the suite */
 };
 
 /* Another way of ours to the same image: further options of pathtracer. */
@@ -44,11 +45,12 @@ struct suite_variant {
 enum { MAX_VARIANTS = 8, MAX_REFERENCES = 8 };
 
 struct suite_scene {
-    char name[64];                      /* "41_cornell" */
-    char dae[4096];                     /* path of the .dae, in a suite of one's own of any file */
-    bool is_opaque;                     /* not COLLADA: only an engine with the format "file" reads it */
-    char environment[4096];             /* path of an .exr or .hdr; empty if there is none */
+    char name[64];          /* "41_cornell" */
+    char dae[4096];         /* path of the .dae, in a suite of one's own of any file */
+    bool is_opaque;         /* not COLLADA: only an engine with the format "file" reads it */
+    char environment[4096]; /* path of an .exr or .hdr; empty if there is none */
     double lens_radius, focal_distance; /* as of struct camera; 0 and 0: pinhole */
+    struct pixel_filter filter;         /* the box of one pixel, but where an engine has its own */
     char sha256[65]; /* lower-case hex: of the .dae; with an environment, a lens or other files, of a text that
                         holds that, the environment's, the lens and the files that it uses */
     char title[128], detects[512], blind_to[512];
@@ -81,8 +83,9 @@ struct suite_scene {
 struct suite {
     struct suite_scene *scene; /* sorted by name */
     int num_scenes;
-    bool is_own;       /* of a suite.json: suite_own.h */
-    char engine[4096]; /* of that: path of the description of what is judged; empty: none is named */
+    bool is_own; /* of a suite.json: suite_own.h */
+    char
+        engine[4096]; /* of that: path of the description of what is judged; empty: none is named */
 };
 
 /* Loads all scenes of a directory: those of its suite.json, else all that stand in it. A 9x scene inherits the `references` object of the scene it

@@ -40,7 +40,7 @@ static bool fill_furnace(const struct suite_scene *scene, json_t *values, struct
     return true;
 }
 
-static const struct truth_kind furnaces[] = {{"furnace", fill_furnace}, {NULL, NULL}};
+static const struct truth_kind furnaces[] = {{"furnace", fill_furnace, true}, {0}};
 
 static const struct truth_kind *const families[] = {
     furnaces,           truth_one_lamp, truth_several_lamps, truth_lens, truth_mirrors_and_glass,
@@ -55,6 +55,15 @@ static const struct truth_kind *find_kind(const char *name)
     return NULL;
 }
 
+bool truth_knows(const struct suite_scene *scene, const struct suite_reference *ref, struct err *e)
+{
+    const struct truth_kind *kind = find_kind(ref->kind);
+    if (kind == NULL)
+        return err_set(e, "unknown closed form");
+    return scene->filter.radius == 0 || kind->by_any_filter ||
+           err_set(e, "the closed form is known for the box of one pixel alone");
+}
+
 bool truth_render(const struct suite_scene *scene, const struct suite_reference *ref,
                   struct moments *out, struct err *e)
 {
@@ -65,9 +74,7 @@ bool truth_render(const struct suite_scene *scene, const struct suite_reference 
         m.spp = 0;
         for (size_t i = 0; i < (size_t)m.width * (size_t)m.height; i++)
             m.n[i] = 1;
-        const struct truth_kind *kind = find_kind(ref->kind);
-        ok = kind != NULL ? kind->fill(scene, ref->values, &m, e)
-                          : err_set(e, "unknown closed form");
+        ok = truth_knows(scene, ref, e) && find_kind(ref->kind)->fill(scene, ref->values, &m, e);
     }
     if (!ok) {
         moments_free(&m);

@@ -13,10 +13,14 @@
 #include "renderer/image/moments.h"
 #include "reference/suite/suite.h"
 
+/* Is the form known for the scene's pixel filter? */
+bool truth_knows(const struct suite_scene *scene, const struct suite_reference *ref, struct err *e)
+    __attribute__((warn_unused_result));
+
 /* Fills *out (unit "exact", spp 0) for that reference of that scene. Fails on an unknown kind, on
- * missing, unknown or impossible values, on a depth at which the form does not hold, and where a
- * quadrature over a pixel has not converged (to 1e-10 of the pixel's value; glass_sphere: truth_pixel_mean.h).
- * The caller frees. */
+ * missing, unknown or impossible values, on a depth at which the form does not hold, on a filter for which
+ * it is not known, and where a quadrature over a pixel has not converged (to 1e-10 of the pixel's value;
+ * glass_sphere: truth_pixel_mean.h). The caller frees. */
 bool truth_render(const struct suite_scene *scene, const struct suite_reference *ref,
                   struct moments *out, struct err *e) __attribute__((warn_unused_result));
 
@@ -25,11 +29,12 @@ bool truth_render(const struct suite_scene *scene, const struct suite_reference 
 double truth_furnace(double emission, double albedo, int depth);
 
 /* A closed form by name. fill() sets all of out->mean, out->width x out->height pixels, from
- * `values`; of the scene it may use depth, lens_radius and focal_distance. */
+ * `values`; of the scene it may use depth, lens_radius and focal_distance, and where it says so the filter. */
 struct truth_kind {
     const char *name;
     bool (*fill)(const struct suite_scene *scene, json_t *values, struct moments *out,
                  struct err *e);
+    bool by_any_filter; /* else of the box of one pixel alone */
 };
 
 /* Fails, naming the channel, unless all three lie in [0, hi]; `hi` may be HUGE_VAL. */

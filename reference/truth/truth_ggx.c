@@ -156,7 +156,7 @@ static bool fill_sphere(const struct facets *facets, const struct suite_scene *s
     struct truth_view view;
     double min_cos;
     json_t *v;
-    if (!ggx_values(values, &v, &s, e) || !truth_view_read(v, &view, e) ||
+    if (!ggx_values(values, &v, &s, e) || !truth_view_read(v, scene, &view, e) ||
         !truth_view_filled(&view, s.centre, s.radius, &min_cos, e))
         return false;
     if (scene->depth < 1)
@@ -180,4 +180,4 @@ static bool fill_beckmann(const struct suite_scene *scene, json_t *values, struc
 }
 
 const struct truth_kind truth_ggx[] = {
-    {"ggx_sphere", fill_ggx}, {"beckmann_sphere", fill_beckmann}, {NULL, NULL}};
+    {"ggx_sphere", fill_ggx, true}, {"beckmann_sphere", fill_beckmann, true}, {0}};

@@ -112,4 +112,4 @@ static bool fill_lens_steps(const struct suite_scene *scene, json_t *values, str
     return true;
 }
 
-const struct truth_kind truth_lens[] = {{"lens_steps", fill_lens_steps}, {NULL, NULL}};
+const struct truth_kind truth_lens[] = {{"lens_steps", fill_lens_steps, false}, {0}};

@@ -207,7 +207,8 @@ static bool fill_slab(const struct suite_scene *scene, json_t *values, struct mo
                        "ior", &s.n, "front", &s.front[0], &s.front[1], &s.front[2], "behind",
                        &s.behind[0], &s.behind[1], &s.behind[2]) != 0)
         return err_set(e, "%s", why.text);
-    if (!truth_view_read(v, &view, e) || !truth_check_triple("front", s.front, HUGE_VAL, e) ||
+    if (!truth_view_read(v, scene, &view, e) ||
+        !truth_check_triple("front", s.front, HUGE_VAL, e) ||
         !truth_check_triple("behind", s.behind, HUGE_VAL, e))
         return false;
     if (!(s.n > 1))
@@ -312,7 +313,7 @@ static bool fill_sphere(const struct suite_scene *scene, json_t *values, struct 
     struct truth_glass_sphere s = {.depth = scene->depth};
     struct truth_view view;
     json_t *v;
-    if (!sphere_values(values, &v, &s, e) || !truth_view_read(v, &view, e))
+    if (!sphere_values(values, &v, &s, e) || !truth_view_read(v, scene, &view, e))
         return false;
     double distance2 = 0;
     for (int k = 0; k < 3; k++) {
@@ -327,7 +328,7 @@ static bool fill_sphere(const struct suite_scene *scene, json_t *values, struct 
     return truth_view_render(&view, truth_glass_sphere_radiance, &s, out, e);
 }
 
-const struct truth_kind truth_mirrors_and_glass[] = {{"mirror_box", fill_mirror_box},
-                                                     {"glass_slab", fill_slab},
-                                                     {"glass_sphere", fill_sphere},
-                                                     {NULL, NULL}};
+const struct truth_kind truth_mirrors_and_glass[] = {{"mirror_box", fill_mirror_box, false},
+                                                     {"glass_slab", fill_slab, true},
+                                                     {"glass_sphere", fill_sphere, true},
+                                                     {0}};

@@ -247,8 +247,8 @@ static bool fill_sphere(const struct suite_scene *scene, json_t *values, struct 
     return fill_plane(&(struct plane){.source = SOURCE_SPHERE}, read_sphere, scene, values, out, e);
 }
 
-const struct truth_kind truth_one_lamp[] = {{"point_over_plane", fill_point},
-                                            {"spot_over_plane", fill_spot},
-                                            {"rectangle_over_plane", fill_rectangle},
-                                            {"sphere_over_plane", fill_sphere},
-                                            {NULL, NULL}};
+const struct truth_kind truth_one_lamp[] = {{"point_over_plane", fill_point, false},
+                                            {"spot_over_plane", fill_spot, false},
+                                            {"rectangle_over_plane", fill_rectangle, false},
+                                            {"sphere_over_plane", fill_sphere, false},
+                                            {0}};

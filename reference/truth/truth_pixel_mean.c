@@ -13,7 +13,8 @@ static double dot3(const double a[3], const double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-bool truth_view_read(json_t *values, struct truth_view *view, struct err *e)
+bool truth_view_read(json_t *values, const struct suite_scene *scene, struct truth_view *view,
+                     struct err *e)
 {
     json_error_t why;
     double *p = view->eye, *r = view->right, *u = view->up, *f = view->forward;
@@ -29,6 +30,10 @@ bool truth_view_read(json_t *values, struct truth_view *view, struct err *e)
                 return err_set(e, "view: right, up and forward are not unit and orthogonal");
     if (!(view->tan_half > 0))
         return err_set(e, "view: tan_half is %g, not above 0", view->tan_half);
+    view->filter = &scene->filter;
+    view->edge = 1;
+    if (scene->filter.radius > 0)
+        view->edge += 2 * (scene->filter.radius - 0.5) / scene->width;
     return true;
 }
 
@@ -63,7 +68,8 @@ bool truth_view_filled(const struct truth_view *view, const double centre[3], do
     /* Directions that meet it form a cone about its middle; of a square, a corner is furthest off. */
     for (int k = 0; k < 4; k++) {
         double d[3], cos_i, normal[3];
-        truth_view_direction(view, k % 2 ? 1 : -1, k / 2 ? 1 : -1, d);
+        truth_view_direction(view, k % 2 ? view->edge : -view->edge,
+                             k / 2 ? view->edge : -view->edge, d);
         if (!truth_sphere_hit(view->eye, d, centre, radius, &cos_i, normal))
             return err_set(e, "the sphere does not fill the image");
         *min_cos = fmin(*min_cos, cos_i);
@@ -76,9 +82,10 @@ struct image_file {
     truth_shade *shade;
     const void *form;
     gsl_integration_glfixed_table *rule, *check;
-    double v;     /* of the scan line */
-    double width; /* of a pixel in u and v */
-    double scale; /* of the pixel's value, for the tolerance */
+    double v;         /* of the scan line */
+    double width;     /* of a pixel in u and v, with a filter of a quarter of what it counts */
+    double centre[2]; /* of the pixel; with a filter alone */
+    double scale;     /* of the pixel's value, for the tolerance */
     bool converged;
 };
 
@@ -86,7 +93,16 @@ static int look(const struct image_file *p, double u, double v, double light[3])
 {
     double d[3];
     truth_view_direction(p->view, u, v, d);
-    return p->shade(p->form, p->view->eye, d, light);
+    int id = p->shade(p->form, p->view->eye, d, light);
+    if (p->view->filter->radius == 0)
+        return id;
+    /* So that its mean over the quarter is that quarter's part of the pixel. */
+    double r = p->view->filter->radius;
+    double weight = pixel_filter_value(p->view->filter, (u - p->centre[0]) * r / p->width) *
+                    pixel_filter_value(p->view->filter, (v - p->centre[1]) * r / p->width) * r * r;
+    for (int c = 0; c < 3; c++)
+        light[c] *= weight;
+    return id;
 }
 
 /* The piece that the whole pixel's border lies in and its middle, or false. */
@@ -233,6 +249,26 @@ static bool smooth_pixel(const struct image_file *p, double u, double v, double 
     return same;
 }
 
+static bool part_of_pixel(struct image_file *p, double u, double v, double mean[3], struct err *e)
+{
+    return (is_one_piece(p, u, v) && smooth_pixel(p, u, v, mean)) || edge_pixel(p, u, v, mean, e);
+}
+
+static bool filtered_pixel(struct image_file *p, double u, double v, double mean[3], struct err *e)
+{
+    p->centre[0] = u;
+    p->centre[1] = v;
+    mean[0] = mean[1] = mean[2] = 0;
+    for (int k = 0; k < 4; k++) {
+        double part[3];
+        if (!part_of_pixel(p, k % 2 ? u : u - p->width, k / 2 ? v : v - p->width, part, e))
+            return false;
+        for (int c = 0; c < 3; c++)
+            mean[c] += part[c];
+    }
+    return true;
+}
+
 bool truth_view_render(const struct truth_view *view, truth_shade *shade, const void *form,
                        struct moments *out, struct err *e)
 {
@@ -244,14 +280,19 @@ bool truth_view_render(const struct truth_view *view, truth_shade *shade, const 
                            .rule = gsl_integration_glfixed_table_alloc(ORDER),
                            .check = gsl_integration_glfixed_table_alloc(2 * ORDER),
                            .width = 2.0 / out->width};
+    const double pixel = p.width;
+    if (view->filter->radius > 0)
+        p.width *= view->filter->radius;
     bool ok = p.rule != NULL && p.check != NULL;
     if (!ok)
         err_set(e, "out of memory for a quadrature rule");
     for (int i = 0; ok && i < out->width * out->height; i++) {
         int col = i % out->width, row = i / out->width;
-        double u = p.width * col - 1, v = p.width * row - 1, *mean = out->mean + 3 * (size_t)i;
-        if (!is_one_piece(&p, u, v) || !smooth_pixel(&p, u, v, mean))
-            ok = edge_pixel(&p, u, v, mean, e) || err_prefix(e, "pixel (%d,%d)", col, row);
+        double u = pixel * col - 1, v = pixel * row - 1, *mean = out->mean + 3 * (size_t)i;
+        ok = (view->filter->radius > 0
+                  ? filtered_pixel(&p, u + 0.5 * pixel, v + 0.5 * pixel, mean, e)
+                  : part_of_pixel(&p, u, v, mean, e)) ||
+             err_prefix(e, "pixel (%d,%d)", col, row);
         if (ok && !(isfinite(mean[0]) && isfinite(mean[1]) && isfinite(mean[2])))
             ok = err_set(e, "pixel (%d,%d) is not a number", col, row);
     }

@@ -1,9 +1,10 @@
-/* What a pinhole camera sees, as an image: the mean of a closed form over each pixel's square. No code
+/* What a pinhole camera sees, as an image: the mean of a closed form over each pixel's square, or weighed by a filter. No code
  * is shared with the renderer's camera: the frame stands as numbers in the .json. */
 #ifndef ASSAY_TRUTH_PIXEL_MEAN_H
 #define ASSAY_TRUTH_PIXEL_MEAN_H
 
 #include "renderer/image/moments.h"
+#include "reference/suite/suite.h"
 
 #include <jansson.h>
 
@@ -12,12 +13,14 @@
  * forward + tan_half (u right - v up). */
 struct truth_view {
     double eye[3], right[3], up[3], forward[3], tan_half;
+    const struct pixel_filter *filter; /* borrowed */
+    double edge; /* largest |u| and |v| that some pixel counts: 1, with a filter more */
 };
 
 /* {"eye": [x,y,z], "right": [..], "up": [..], "forward": [..], "tan_half": t}: these keys, no others;
- * the frame orthonormal to 1e-12. */
-bool truth_view_read(json_t *values, struct truth_view *view, struct err *e)
-    __attribute__((warn_unused_result));
+ * the frame orthonormal to 1e-12. The filter is the scene's. */
+bool truth_view_read(json_t *values, const struct suite_scene *scene, struct truth_view *view,
+                     struct err *e) __attribute__((warn_unused_result));
 
 /* Direction of (u, v), unit length. */
 void truth_view_direction(const struct truth_view *view, double u, double v, double d[3]);
@@ -27,7 +30,7 @@ void truth_view_direction(const struct truth_view *view, double u, double v, dou
 bool truth_sphere_hit(const double o[3], const double d[3], const double centre[3], double radius,
                       double *cos_i, double normal[3]);
 
-/* The smallest cosine of incidence on a sphere that fills the whole image. Fails if it does not. */
+/* The smallest cosine of incidence on a sphere that fills all that the image counts. Fails if it does not. */
 bool truth_view_filled(const struct truth_view *view, const double centre[3], double radius,
                        double *min_cos, struct err *e) __attribute__((warn_unused_result));
 
@@ -38,7 +41,8 @@ typedef int truth_shade(const void *form, const double eye[3], const double d[3]
 /* Means over the pixels of a square image. A pixel of one piece: Gauss-Legendre rules with 8 x 8 and
  * 16 x 16 points that agree to 1e-10 of the value. Any other: scan lines, cut where the piece changes
  * (found by bisection), each part and the lines themselves bisected until Gauss-Legendre rules agree to
- * 1e-6 of the value. Fails where they never do, and on images that are not square. */
+ * 1e-6 of the value. With a filter each quarter around the pixel's centre by itself, as a filter has a kink there.
+ * Fails where they never do, and on images that are not square. */
 bool truth_view_render(const struct truth_view *view, truth_shade *shade, const void *form,
                        struct moments *out, struct err *e) __attribute__((warn_unused_result));
 

@@ -124,4 +124,4 @@ static bool fill_lamps(const struct suite_scene *scene, json_t *values, struct m
     return render(&l, out, e);
 }
 
-const struct truth_kind truth_several_lamps[] = {{"lamps_over_plane", fill_lamps}, {NULL, NULL}};
+const struct truth_kind truth_several_lamps[] = {{"lamps_over_plane", fill_lamps, false}, {0}};

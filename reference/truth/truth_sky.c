@@ -53,7 +53,7 @@ static bool fill_floor(const struct suite_scene *scene, json_t *values, struct m
                        &s.albedo[2], "floor_edge", &s.edge, "wall", "x", &s.wall_x, "z",
                        &s.wall_z[0], &s.wall_z[1], "height", &s.height) != 0)
         return err_set(e, "%s", why.text);
-    if (!truth_view_read(v, &view, e) || !truth_check_triple("sky", s.sky, HUGE_VAL, e) ||
+    if (!truth_view_read(v, scene, &view, e) || !truth_check_triple("sky", s.sky, HUGE_VAL, e) ||
         !truth_check_triple("albedo", s.albedo, 1, e))
         return false;
     if (!(s.height > 0 && s.wall_z[0] < s.wall_z[1]))
@@ -143,7 +143,7 @@ static bool fill_gradient(const struct suite_scene *scene, json_t *values, struc
                        &s.radius, "albedo", &s.albedo[0], &s.albedo[1], &s.albedo[2], "mean", &mean,
                        "gradient", &gradient) != 0)
         return err_set(e, "%s", why.text);
-    if (!truth_view_read(v, &view, e) || !truth_gradient_read(values, &s.sky, e) ||
+    if (!truth_view_read(v, scene, &view, e) || !truth_gradient_read(values, &s.sky, e) ||
         !truth_check_triple("albedo", s.albedo, 1, e) ||
         !truth_view_filled(&view, s.centre, s.radius, &min_cos, e))
         return false;
@@ -153,4 +153,4 @@ static bool fill_gradient(const struct suite_scene *scene, json_t *values, struc
 }
 
 const struct truth_kind truth_sky[] = {
-    {"sky_and_wall", fill_floor}, {"sky_gradient", fill_gradient}, {NULL, NULL}};
+    {"sky_and_wall", fill_floor, true}, {"sky_gradient", fill_gradient, false}, {0}};

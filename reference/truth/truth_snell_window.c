@@ -39,7 +39,7 @@ static bool fill_window(const struct suite_scene *scene, json_t *values, struct 
                        "ior", &w.n, "sky", &w.sky[0], &w.sky[1], &w.sky[2], "floor", &w.floor[0],
                        &w.floor[1], &w.floor[2]) != 0)
         return err_set(e, "%s", why.text);
-    if (!truth_view_read(v, &view, e) || !truth_check_triple("sky", w.sky, HUGE_VAL, e) ||
+    if (!truth_view_read(v, scene, &view, e) || !truth_check_triple("sky", w.sky, HUGE_VAL, e) ||
         !truth_check_triple("floor", w.floor, HUGE_VAL, e))
         return false;
     if (!(w.n > 1))
@@ -57,4 +57,4 @@ static bool fill_window(const struct suite_scene *scene, json_t *values, struct 
     return truth_view_render(&view, window_radiance, &w, out, e);
 }
 
-const struct truth_kind truth_snell_window[] = {{"snell_window", fill_window}, {NULL, NULL}};
+const struct truth_kind truth_snell_window[] = {{"snell_window", fill_window, true}, {0}};

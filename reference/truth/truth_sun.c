@@ -93,4 +93,4 @@ static bool fill_pyramid(const struct suite_scene *scene, json_t *values, struct
     return true;
 }
 
-const struct truth_kind truth_sun[] = {{"sun_on_pyramid", fill_pyramid}, {NULL, NULL}};
+const struct truth_kind truth_sun[] = {{"sun_on_pyramid", fill_pyramid, false}, {0}};

@@ -172,4 +172,4 @@ static bool fill_pictures(const struct suite_scene *scene, json_t *values, struc
     return ok;
 }
 
-const struct truth_kind truth_texture[] = {{"pictures", fill_pictures}, {NULL, NULL}};
+const struct truth_kind truth_texture[] = {{"pictures", fill_pictures, false}, {0}};

@@ -90,6 +90,12 @@ static bool read_heatmap(void *options, const char *const v[4], struct err *e)
     return has_ending(v[0], ".png") || err_set(e, "--heatmap: '%s' does not end in .png", v[0]);
 }
 
+static bool read_filter(void *options, const char *const v[4], struct err *e)
+{
+    struct options *s = options;
+    return pixel_filter_parse(v[0], &s->filter, e) || err_prefix(e, "--filter");
+}
+
 static bool read_cell(void *options, const char *const v[4], struct err *e)
 {
     struct options *s = options;
@@ -174,6 +180,10 @@ static const struct cli_option options[] = {
      "centre visits",
      .read = read_heatmap},
     {'r', "resolution", "W H", "pixels, also as WxH (800 600)", TO(width), 1, 65535},
+    {0, "filter", "HOW",
+     "of a pixel: box, box:RADIUS, tent:RADIUS or gauss:SIGMA:RADIUS,\n"
+     "in pixels (box:0.5)",
+     .read = read_filter},
     {'p', "cell", "X Y DX DY", "render only this cell, origin at the bottom left",
      .read = read_cell},
     {'c', "camera", "NAME",

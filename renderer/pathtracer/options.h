@@ -34,7 +34,8 @@ struct options {
     double pilot_tolerance;                     /* negative: no pilot */
     double lens_radius, focal_distance;         /* negative: not given */
     double max_seconds, max_error, write_every; /* 0: off */
-    int slurm;                                  /* jobs on a cluster; 0: render here */
+    struct pixel_filter filter;
+    int slurm; /* jobs on a cluster; 0: render here */
     enum { ACTION_RENDER, ACTION_CAMERAS, ACTION_HELP, ACTION_VERSION, ACTION_LIST } action;
 };
 

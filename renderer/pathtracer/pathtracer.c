@@ -71,6 +71,7 @@ static bool setup_camera(const struct options *o, const struct scene *scene, str
         camera_show_whole(c);
     if (o->camera_file != NULL && !camera_read_file(c, o->camera_file, e))
         return false;
+    c->filter = o->filter;
     if (o->lens_radius >= 0)
         c->lens_radius = (float)o->lens_radius;
     if (c->is_orthographic && c->lens_radius > 0)

@@ -52,6 +52,12 @@ bool render_id_make(const struct options *o, const struct scene *s, struct rende
         size_t n = strlen(id->settings);
         snprintf(id->settings + n, sizeof id->settings - n, "; images %.32s", images);
     }
+    if (o->filter.radius > 0) {
+        size_t n = strlen(id->settings);
+        char filter[PIXEL_FILTER_TEXT];
+        pixel_filter_print(&o->filter, filter);
+        snprintf(id->settings + n, sizeof id->settings - n, "; filter %s", filter);
+    }
     if (o->adaptive_batch > 0)
         snprintf(id->adaptive, sizeof id->adaptive, "rule %d %.17g", o->adaptive_batch,
                  o->adaptive_tolerance);

@@ -1,7 +1,8 @@
-/* From pixels to rays: pinhole, thin lens or parallel, box filter of one pixel. */
+/* From pixels to rays: pinhole, thin lens or parallel, and where in and around a pixel they begin. */
 #ifndef ASSAY_CAMERA_H
 #define ASSAY_CAMERA_H
 
+#include "pixel_filter.h"
 #include "scene.h"
 
 /* The camera of one image. Row 0 is the top row. Image-plane point (sx, sy), both in [-1,1] with
@@ -10,11 +11,12 @@
 struct camera {
     vec3 eye, right, up, backward; /* unit, orthogonal */
     bool is_orthographic;
-    float tan_h, tan_v;   /* tangents of the half angles of view; orthographic: half sizes */
-    float near, far;      /* measured along the ray, as the assignment does */
-    int width, height;    /* of the full image, pixels */
-    float lens_radius;    /* 0: pinhole */
-    float focal_distance; /* of the plane in focus, along the axis */
+    float tan_h, tan_v;         /* tangents of the half angles of view; orthographic: half sizes */
+    float near, far;            /* measured along the ray, as the assignment does */
+    int width, height;          /* of the full image, pixels */
+    float lens_radius;          /* 0: pinhole */
+    float focal_distance;       /* of the plane in focus, along the axis */
+    struct pixel_filter filter; /* all zero: the box of one pixel */
 };
 
 /* Frames the scene for a width x height image by the scene's dialect: COLLADA keeps the file's

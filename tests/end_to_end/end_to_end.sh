@@ -601,6 +601,19 @@ expect "what a renderer cannot express is listed" 0 "student cannot express 12_p
     env PATH="$engine_path" $validate --only 11_furnace --only 12_point_plane \
     --engine "$tmp/no_points.json" --engine-spp 4 --engine-replicates 3
 
+# A pixel filter of its own: the references are made with it, and another than it says is found.
+filtered() { # FILTER
+    cat >"$tmp/filtered.json" <<END
+{"name": "filtered", "format": "dae", "expresses": ["diffuse", "environment"], "output": "mean", "spp": 256, "replicates": 16,
+ "command": ["$PWD/build/pathtracer", "-q", "{scene}", "-s", "{spp}", "-m", "{depth}", "--seed", "{seed}", "-r", "{width}",
+             "{height}", "-t", "{threads}", "--filter", "$1", "-f", "{out}"],
+ "environment_args": ["-e", "{environment}"], "filter": "gauss:0.5:2", "shared_samples": false}
+END
+    "$san_assay" validate -q --only 34_sky_constant/filtered:truth --engine "$tmp/filtered.json" -o "$tmp/filtered"
+}
+expect "a pixel filter that is declared is that of both sides" 0 "^filtered has the pixel filter gauss:0.5:2, .*left out.* cycles in" filtered gauss:0.5:2
+expect "a wider filter than is declared is found" 1 "34_sky_constant  *filtered  *truth .* DIFFERENT" filtered gauss:0.6:2.4
+
 # Missing, stale and damaged goldens are never a pass.
 expect "missing goldens are not judged" 3 "11_furnace" $validate --only 11_furnace --golden "$tmp/none"
 cp -R golden "$tmp/golden"

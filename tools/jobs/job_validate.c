@@ -131,9 +131,9 @@ static void add_new(json_t *all, json_t *more)
 static bool add_results(const struct plan *p, int k, const char *out, json_t *results,
                         struct err *e)
 {
-    /* The margin is one object, the same in each. */
-    static const char *const lists[] = {"claims",      "not_expressible", "loader",
-                                        "consistency", "noise",           "engine_margin"};
+    /* Margin and filter are one object each, the same in all. */
+    static const char *const lists[] = {"claims", "not_expressible", "loader",       "consistency",
+                                        "noise",  "engine_margin",   "engine_filter"};
     char path[PLAN_PATH + 256], to[PLAN_PATH + 16];
     json_t *part;
     job_run_artefact(p, k, "results.json", path);

@@ -119,6 +119,8 @@ static void write_verdict(FILE *f, const json_t *root, const struct claim_ref *c
             "all scenes: %s</p>\n",
             member_or_empty(margin, "engine"), 100 * member_number(margin, "global"),
             100 * member_number(margin, "tile"), member_or_empty(margin, "reason"));
+    if (member_text(root, "engine_filter") != NULL)
+        html_print(f, "<p class=\"lede\">%s.</p>\n", member_text(root, "engine_filter"));
     const char *located = member_text(root, "located");
     if (located != NULL)
         html_print(f, "<p class=\"lede\">%s</p>\n", located);

@@ -117,14 +117,15 @@ double side_cost(const struct side *s, int look)
     return n * samples * s->scene->width * s->scene->height;
 }
 
-/* data/scene/name[_fresh][_n].ending */
+/* data/scene/name[_filter][_fresh][_n].ending */
 static void file_of(const struct validation *v, const struct side *s, int stage, int look,
                     const char *ending, char file[256])
 {
     char n[16] = "";
     if (v->sequence != &alpha_spending_single && side_grows(s))
         snprintf(n, sizeof n, "_%d", side_count(s, look));
-    snprintf(file, 256, "data/%s/%s%s%s.%s", s->scene->name, s->name,
+    bool filtered = s->scene->filter.radius > 0 && s->kind != SIDE_ENGINE;
+    snprintf(file, 256, "data/%s/%s%s%s%s.%s", s->scene->name, s->name, filtered ? "_filter" : "",
              stage > 0 && s->kind != SIDE_TRUTH ? "_fresh" : "", n, ending);
 }
 
@@ -253,6 +254,21 @@ static bool add_before(const struct side_image *before, struct side_image *more,
     return manifest != NULL || err_set(e, "out of memory");
 }
 
+/* Stored by an engine with a description, which names its filter, or by one that has the box of one pixel. */
+static bool has_filter_of(const struct side *s, const json_t *manifest, struct err *e)
+{
+    const char *stored =
+        json_string_value(json_object_get(json_object_get(manifest, "description"), "filter"));
+    struct pixel_filter filter;
+    char has[PIXEL_FILTER_TEXT], wanted[PIXEL_FILTER_TEXT];
+    if (!pixel_filter_parse(stored != NULL ? stored : "box", &filter, e))
+        return err_prefix(e, "%s, %s: the manifest", s->scene->name, s->name);
+    pixel_filter_print(&filter, has);
+    pixel_filter_print(&s->scene->filter, wanted);
+    return strcmp(has, wanted) == 0 || err_set(e, "%s, %s: stored with the pixel filter %s, not %s",
+                                               s->scene->name, s->name, has, wanted);
+}
+
 static bool make(struct validation *v, struct side *s, int stage, int look, struct side_image *out)
 {
     int l = below(s, stage, look);
@@ -266,7 +282,8 @@ static bool make(struct validation *v, struct side *s, int stage, int look, stru
     case SIDE_OURS: ok = render_ours(v, s, stage, look, first, out, &s->e); break;
     case SIDE_TRUTH: ok = truth_render(s->scene, s->ref, &out->m, &s->e); break;
     case SIDE_GOLDEN:
-        ok = golden_read(v->opt->golden_dir, s->scene, s->ref, &out->m, &out->manifest, &s->e);
+        ok = golden_read(v->opt->golden_dir, s->scene, s->ref, &out->m, &out->manifest, &s->e) &&
+             has_filter_of(s, out->manifest, &s->e);
         break;
     case SIDE_LIVE: ok = render_live(v, s, stage, look, first, out, &s->e); break;
     case SIDE_ENGINE: ok = render_engine(v, s, stage, out, &s->e); break;

@@ -22,7 +22,7 @@ bool run_pathtracer(const struct pathtracer_job *job, struct moments *out, doubl
 {
     const struct suite_scene *s = job->scene;
     char width[16], height[16], spp[16], depth[16], threads[16], seed[32], lens[32], focus[32];
-    char range[32];
+    char range[32], filter[PIXEL_FILTER_TEXT];
     snprintf(width, sizeof width, "%d", s->width);
     snprintf(height, sizeof height, "%d", s->height);
     snprintf(spp, sizeof spp, "%d", job->spp);
@@ -45,6 +45,11 @@ bool run_pathtracer(const struct pathtracer_job *job, struct moments *out, doubl
         argv[argc++] = lens;
         argv[argc++] = "-d";
         argv[argc++] = focus;
+    }
+    if (s->filter.radius > 0) {
+        pixel_filter_print(&s->filter, filter);
+        argv[argc++] = "--filter";
+        argv[argc++] = filter;
     }
     if (job->first > 0) {
         argv[argc++] = "--samples";

@@ -1,6 +1,10 @@
 #include "noise_ladder.h"
 #include "validate_internal.h"
 
+#include "reference/external/engine_bindings.h"
+#include "reference/store/reference_render.h"
+#include "reference/truth/truth.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -124,6 +128,60 @@ static bool ask_engine(const struct validation *v, bool *can, json_t *cannot, st
     return true;
 }
 
+static enum side_kind kind_of(const struct validation *v, const struct suite_reference *ref)
+{
+    return strcmp(ref->engine, "truth") == 0        ? SIDE_TRUTH
+           : strcmp(ref->engine, "pathtracer") == 0 ? SIDE_OURS
+           : v->opt->live                           ? SIDE_LIVE
+                                                    : SIDE_GOLDEN;
+}
+
+/* Can this reference be had with the scene's filter? */
+static bool is_filtered(const struct validation *v, const struct suite_scene *s,
+                        const struct suite_reference *ref, struct err *why)
+{
+    switch (kind_of(v, ref)) {
+    case SIDE_TRUTH: return truth_knows(s, ref, why);
+    case SIDE_LIVE: {
+        const struct reference_options ro = {.work_dir = v->opt->out_dir};
+        return reference_is_expressible(s, ref, &ro, why);
+    }
+    case SIDE_OURS:
+    case SIDE_ENGINE: return true;
+    case SIDE_GOLDEN: break;
+    }
+    /* Cycles' and POV-Ray's have the box of one pixel; any other says how it was made, to make() in claim_side.c. */
+    return engine_driver_of(ref->engine) == NULL;
+}
+
+/* Of all scenes, so that each part of a run says the same. */
+static bool init_peers(struct validation *v, struct err *e)
+{
+    v->left_out = json_object();
+    for (int i = 0; v->left_out != NULL && i < v->suite.num_scenes; i++) {
+        struct scene_sides *own = &v->sides[i];
+        const struct suite_scene *s = &v->suite.scene[i];
+        own->filtered = *s;
+        own->filtered.filter = v->opt->engine->filter;
+        own->peer_ours = own->ours;
+        own->peer_ours.scene = &own->filtered;
+        for (int k = 0; k < s->num_references; k++) {
+            const char *name = s->reference[k].engine;
+            struct err why;
+            own->peer[k] = own->reference[k];
+            if (is_filtered(v, &own->filtered, &s->reference[k], &why)) {
+                own->peer[k].scene = &own->filtered;
+                continue;
+            }
+            own->peer[k].scene = NULL;
+            json_object_set_new(
+                v->left_out, name,
+                json_integer(1 + json_integer_value(json_object_get(v->left_out, name))));
+        }
+    }
+    return v->left_out != NULL || err_set(e, "out of memory");
+}
+
 static void init_sides(struct validation *v)
 {
     for (int i = 0; i < v->suite.num_scenes; i++) {
@@ -141,13 +199,7 @@ static void init_sides(struct validation *v)
         for (int k = 0; k < s->num_references; k++) {
             const struct suite_reference *ref = &s->reference[k];
             own->reference[k] =
-                (struct side){.kind = strcmp(ref->engine, "truth") == 0        ? SIDE_TRUTH
-                                      : strcmp(ref->engine, "pathtracer") == 0 ? SIDE_OURS
-                                      : v->opt->live                           ? SIDE_LIVE
-                                                                               : SIDE_GOLDEN,
-                              .name = ref->engine,
-                              .scene = s,
-                              .ref = ref};
+                (struct side){.kind = kind_of(v, ref), .name = ref->engine, .scene = s, .ref = ref};
         }
     }
 }
@@ -208,14 +260,18 @@ static void add_scene(struct validation *v, const struct suite_scene *s, bool en
                       bool of_noise)
 {
     struct scene_sides *own = &v->sides[s - v->suite.scene];
-    struct side *from =
-        v->sides[suite_find(&v->suite, s->references_of) - v->suite.scene].reference;
+    struct scene_sides *theirs =
+        &v->sides[suite_find(&v->suite, s->references_of) - v->suite.scene];
+    struct side *from = theirs->reference;
+    bool filtered = engine_can && v->opt->engine->filter.radius > 0;
+    struct side *peer = filtered ? theirs->peer : from;
     const struct suite_reference *truth = suite_reference_of(s, "truth");
     struct suite_reference self = {.engine = "pathtracer", .fidelity = "exact"};
     int t = truth != NULL ? (int)(truth - s->reference) : 0;
     if (v->suite.is_own) { /* it is about the engine alone */
         for (int i = 0; engine_can && i < s->num_references; i++)
-            add_task(v, s, &own->engine, &from[i], &s->reference[i], s->expect);
+            if (peer[i].scene != NULL)
+                add_task(v, s, &own->engine, &peer[i], &s->reference[i], s->expect);
         return;
     }
     for (int i = 0; i < s->num_references; i++)
@@ -225,13 +281,15 @@ static void add_scene(struct validation *v, const struct suite_scene *s, bool en
             add_task(v, s, &from[i], &from[t], truth, s->expect);
     for (int i = 0; engine_can && i < s->num_references; i++) {
         const struct suite_reference *ref = &s->reference[i];
-        add_task(v, s, &own->engine, &from[i], ref, s->expect);
+        if (peer[i].scene != NULL)
+            add_task(v, s, &own->engine, &peer[i], ref, s->expect);
         /* Against ours inside the widest margins. */
         self.margin_global = fmax(self.margin_global, ref->margin_global);
         self.margin_tile = fmax(self.margin_tile, ref->margin_tile);
     }
     if (engine_can) /* of the same scene, also 9x */
-        add_task(v, s, &own->engine, &own->ours, &self, VERDICT_EQUIVALENT);
+        add_task(v, s, &own->engine, filtered ? &own->peer_ours : &own->ours, &self,
+                 VERDICT_EQUIVALENT);
     /* Our other ways to the same image, against the closed form or else the first reference. */
     for (int i = 0; i < s->num_variants; i++) {
         struct suite_reference ref = s->reference[t];
@@ -260,6 +318,8 @@ bool select_claims(struct validation *v, json_t *cannot, struct err *e)
     }
     init_sides(v);
     bool ok = ask_engine(v, can, cannot, e);
+    if (ok && v->opt->engine != NULL && v->opt->engine->filter.radius > 0)
+        ok = init_peers(v, e);
     int most = 0;
     v->num_tasks = 0;
     for (int i = 0; ok && i < v->suite.num_scenes; i++)

@@ -175,11 +175,13 @@ static void validation_free(struct validation *v)
         struct scene_sides *s = &v->sides[i];
         side_free(&s->ours);
         side_free(&s->engine);
+        side_free(&s->peer_ours);
         for (int k = 0; k < MAX_VARIANTS; k++)
             side_free(&s->variant[k]);
         for (int k = 0; k < MAX_REFERENCES; k++)
-            side_free(&s->reference[k]);
+            side_free(&s->reference[k]), side_free(&s->peer[k]);
     }
+    json_decref(v->left_out);
     free(v->task);
     free(v->sides);
     suite_free(&v->suite);
@@ -199,6 +201,20 @@ static bool check_loader(const struct validation *v, const struct import_options
     ok = ok && import_check(scene, num, io, loader, e);
     free(scene);
     return ok;
+}
+
+static json_t *filter_sentence(const struct validation *v)
+{
+    char filter[PIXEL_FILTER_TEXT], left_out[256] = "";
+    const json_t *count;
+    const char *name;
+    json_object_foreach(v->left_out, name, count) snprintf(
+        left_out + strlen(left_out), sizeof left_out - strlen(left_out), "%s%s in %d scenes",
+        left_out[0] != '\0' ? ", " : "; left out, as known for the box of one pixel alone: ", name,
+        (int)json_integer_value(count));
+    pixel_filter_print(&v->opt->engine->filter, filter);
+    return json_sprintf("%s has the pixel filter %s, and so has what it is held against%s",
+                        v->opt->engine->name, filter, left_out);
 }
 
 /* From whatever folder it was started. */
@@ -243,6 +259,8 @@ bool validate(const struct validate_options *opt, int argc, char **argv, json_t 
                             json_pack("{ss,sf,sf,ss}", "engine", opt->engine->name, "global",
                                       opt->engine->margin_global, "tile", opt->engine->margin_tile,
                                       "reason", opt->engine->margin_reason));
+    if (v.left_out != NULL)
+        json_object_set_new(root, "engine_filter", filter_sentence(&v));
     if (opt->live) {
         const struct import_options io = {
             .work_dir = opt->out_dir, .share_dir = opt->share_dir, .timeout_s = opt->timeout_s};

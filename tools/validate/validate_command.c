@@ -125,6 +125,8 @@ static void print_not_expressible(const json_t *results)
         printf("%s declares margins of its own, %g %% of an image and %g %% of a tile: %s\n",
                member_or_empty(margin, "engine"), 100 * member_number(margin, "global"),
                100 * member_number(margin, "tile"), member_or_empty(margin, "reason"));
+    if (json_object_get(results, "engine_filter") != NULL)
+        puts(member_text(results, "engine_filter"));
     json_array_foreach(json_object_get(results, "not_expressible"), i, entry)
         printf("%s cannot express %s: %s\n", member_text(entry, "engine"),
                member_text(entry, "scene"), member_text(entry, "reason"));

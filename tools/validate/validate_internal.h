@@ -48,6 +48,10 @@ struct side {
 
 struct scene_sides {
     struct side ours, variant[MAX_VARIANTS], reference[MAX_REFERENCES], engine;
+    /* What the engine is held against: the sides above, or, where it has a pixel filter of its own, those of the scene
+     * with that filter; of a reference that cannot be had with it, scene is NULL. */
+    struct suite_scene filtered;
+    struct side peer_ours, peer[MAX_REFERENCES];
 };
 
 /* One claim on its way. */
@@ -76,6 +80,8 @@ struct validation {
     struct scene_sides *sides; /* per scene */
     struct claim_run *task;
     int num_tasks, done;
+    json_t *
+        left_out; /* {reference: in how many scenes it cannot be had with the engine's filter}; NULL: that is the box of one pixel */
     const struct alpha_spending *sequence;
     int stages;
     double start, deadline; /* of now_seconds(); deadline INFINITY: none */

@@ -145,6 +145,9 @@ TEST(bad_descriptions_are_refused)
         {"output", "\"variance\"", "none of: mean, exact, moments"},
         {"output", "\"exact\"", "has a {seed}, but 'output' is 'exact'"},
         {"scale", "0", "'scale' is 0, not between"},
+        {"filter", "\"sinc:2\"", "'filter': a pixel filter is box"},
+        {"filter", "1", "'filter' is not"},
+        {"shared_samples", "true", "about a 'filter', which is not there"},
         {"channels", "\"apart\"", "none of: together, separate"},
         {"margin", "0.1", "'margin' is not an object"},
         {"margin", "{\"global\": 0.1, \"tile\": 0.2}", "missing key 'margin.reason'"},
@@ -423,6 +426,35 @@ TEST(replicates_are_folded)
     json_decref(manifest);
     moments_free(&m);
     engine_free(&en);
+}
+
+/* x, 2 x, 5 x: mean 8 x/3, M2 = 78 x^2/9 = 26 x^2/3; a tent of radius 1 in which pixels share samples makes that 2.25 times as
+ * much (test_camera.c), one from which each pixel draws its own nothing. */
+TEST(pixels_that_share_samples_count_as_noisier)
+{
+    static const char *const more[] = {", \"filter\": \"tent:1\"",
+                                       ", \"filter\": \"tent:1\", \"shared_samples\": false"};
+    for (int i = 0; i < 2; i++) {
+        struct engine en;
+        struct moments m;
+        json_t *manifest;
+        struct err e = {""};
+        for (int k = 0; k < K; k++) {
+            char name[64];
+            snprintf(name, sizeof name, "picture_%u.pfm", replicate_seed(SEED, k));
+            write_pfm(name, W, H, ramp, k);
+        }
+        engine_of_script("cp {here}/picture_$3.pfm $2 && grep -q triangle $1", more[i], &en);
+        MUST(render(&en, &point_plane, &m, &manifest, &e));
+        for (int p = 0; p < PIXELS; p++) {
+            double x = p + 1, m2 = (i == 0 ? 2.25 : 1) * 26 / 3 * x * x;
+            assert_true(fabs(m.mean[3 * p] - 8 * x / 3) < 1e-6 * x);
+            assert_true(fabs(m.m2[3 * p] - m2) < 1e-5 * m2);
+        }
+        json_decref(manifest);
+        moments_free(&m);
+        engine_free(&en);
+    }
 }
 
 /* One run for each channel, each with a seed of its own and a scene in which all colours are grey, as they are in that channel:

@@ -1,4 +1,5 @@
-/* Camera files: what is refused, with the file's name, and where the rays of one that is read go. */
+/* Camera files: what is refused, with the file's name, and where the rays of one that is read go. Pixel filters against their
+ * closed forms. */
 #include "renderer/scene/camera.h"
 #include "tests/support/test.h"
 
@@ -179,5 +180,77 @@ TEST(orthographic_rays_are_parallel)
             assert_true(fabsf(r.o.y - 1.5f * (1 - y / 10)) < 1e-6f);
             assert_true(r.o.z == 5 && r.tmin == 0.5f && r.tmax == 9);
         }
+    }
+}
+
+/* Their distribution functions. Tent of radius r: 1/2 + x/r - x^2/(2 r^2) for x above 0. Gauss less its value g = exp(-r^2/2 s^2)
+ * at the radius: with c = s sqrt(pi/2), 1/2 + (c erf(x/(s sqrt 2)) - g x) / (2 (c erf(r/(s sqrt 2)) - g r)). All are odd
+ * about 1/2. The density is their derivative, here by differences. */
+static double share_below(const struct pixel_filter *f, double x)
+{
+    double y = fabs(x), r = f->radius, g = exp(-0.5 * r * r / (f->sigma * f->sigma)),
+           c = f->sigma * sqrt(acos(-1) / 2), half;
+    if (f->kind == PIXEL_FILTER_BOX)
+        half = y / (2 * r);
+    else if (f->kind == PIXEL_FILTER_TENT)
+        half = y / r - y * y / (2 * r * r);
+    else
+        half = (c * erf(y / (f->sigma * sqrt(2))) - g * y) /
+               (c * erf(r / (f->sigma * sqrt(2))) - g * r) / 2;
+    return 0.5 + copysign(half, x);
+}
+
+TEST(filters_are_drawn_by_their_law)
+{
+    static const char *const texts[] = {"box:1.25",    "tent:1",      "tent:0.5",
+                                        "gauss:0.5:2", "gauss:0.5:3", "gauss:2:1"};
+    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
+        struct pixel_filter f;
+        struct err e = {""};
+        char text[PIXEL_FILTER_TEXT];
+        MUST(pixel_filter_parse(texts[i], &f, &e));
+        pixel_filter_print(&f, text);
+        assert_string_equal(text, texts[i]);
+        for (int k = 0; k < 10000; k++) {
+            float u = (float)k / 10000;
+            double x = (double)pixel_filter_sample(&f, u), h = 1e-5;
+            if (!(fabs(share_below(&f, x) - (double)u) < 1e-6) || fabs(x) > f.radius)
+                fail_msg("%s: %g at %g, where %g lies below", text, (double)u, x,
+                         share_below(&f, x));
+            if (fabs(x) > 1e-4 && fabs(x) < f.radius - 1e-4)
+                assert_true(fabs((share_below(&f, x + h) - share_below(&f, x - h)) / (2 * h) -
+                                 pixel_filter_value(&f, x)) < 1e-5);
+        }
+        assert_true(pixel_filter_value(&f, f.radius + 1e-9) == 0);
+    }
+}
+
+/* Of a tent of radius 1 the filters of all pixels add up to 1, and the integrals of its square and cube are 2/3 and 1/2: 1.5 and 2 on
+ * each axis. Of a box of two pixels' width they add up to 1, too, and f is 1/2: 2 and 4. */
+TEST(what_pixels_share_is_known)
+{
+    struct pixel_filter f = {0};
+    struct err e = {""};
+    assert_true(pixel_filter_sharing(&f, 2) == 1 && pixel_filter_value(&f, 0.4) == 1);
+    MUST(pixel_filter_parse("tent:1", &f, &e));
+    assert_true(fabs(pixel_filter_sharing(&f, 2) - 2.25) < 1e-5 &&
+                fabs(pixel_filter_sharing(&f, 3) - 4) < 1e-5);
+    MUST(pixel_filter_parse("box:1", &f, &e));
+    assert_true(fabs(pixel_filter_sharing(&f, 2) - 4) < 1e-5 &&
+                fabs(pixel_filter_sharing(&f, 3) - 16) < 1e-5);
+    MUST(pixel_filter_parse("box:0.5", &f, &e));
+    assert_true(f.radius == 0);
+}
+
+TEST(filters_are_refused)
+{
+    static const char *const bad[] = {
+        "",         "mitchell",  "gauss",       "gauss:0.5:",   "tent:1:2", "box:x",
+        "tent:0.4", "gauss:9:2", "gauss:nan:2", "gauss:0.5:17", "box:inf",  "tent:1 "};
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        struct pixel_filter f;
+        struct err e = {""};
+        assert_false(pixel_filter_parse(bad[i], &f, &e));
+        assert_non_null(strstr(e.msg, "a pixel filter"));
     }
 }

@@ -1,0 +1,46 @@
+/* How a pixel weighs the light around its centre: the image's value is the integral of radiance times f(x) f(y),
+ * x and y in pixels from the centre. */
+#ifndef ASSAY_PIXEL_FILTER_H
+#define ASSAY_PIXEL_FILTER_H
+
+#include "renderer/base/err.h"
+
+enum { PIXEL_FILTER_BINS = 256, PIXEL_FILTER_TEXT = 64 };
+
+enum pixel_filter_kind { PIXEL_FILTER_BOX, PIXEL_FILTER_TENT, PIXEL_FILTER_GAUSS };
+
+/* f is 0 beyond the radius, and else proportional to 1 (box), 1 - |x|/radius (tent), exp(-x^2/(2 sigma^2)) less its value
+ * at the radius (Gauss, as pbrt and Mitsuba have it). All zero is the box of one pixel. */
+struct pixel_filter {
+    enum pixel_filter_kind kind;
+    double radius, sigma; /* pixels; radius 0: the box of one pixel */
+    double top;           /* f's factor, so that its integral is 1 */
+    float quantile[PIXEL_FILTER_BINS +
+                   1]; /* between each and the next lies 1/BINS of f: where to begin */
+};
+
+extern const char *const pixel_filter_names[]; /* by enum pixel_filter_kind; end with NULL */
+
+/* Radius from 0.5, as less would leave light between the pixels out, to 16; sigma, of Gauss alone, from 0.05 to 8. Fails on
+ * any other. */
+bool pixel_filter_make(struct pixel_filter *f, enum pixel_filter_kind kind, double radius,
+                       double sigma, struct err *e) __attribute__((warn_unused_result));
+/* "box:1", "tent:1", "gauss:SIGMA:RADIUS"; without a radius box:0.5, tent:1, six sigmas of Gauss. */
+bool pixel_filter_parse(const char *text, struct pixel_filter *f, struct err *e)
+    __attribute__((warn_unused_result));
+/* The same text again. */
+void pixel_filter_print(const struct pixel_filter *f, char text[PIXEL_FILTER_TEXT]);
+
+/* f(x), per pixel. */
+double pixel_filter_value(const struct pixel_filter *f, double x);
+/* The point, from the centre, below which the share u in [0,1) of f lies: distributed as f is, so that every sample weighs the
+ * same. Not of the box of one pixel. */
+float pixel_filter_sample(const struct pixel_filter *f, float u);
+
+/* Where pixels share samples, each of which is counted by all filters that reach it: how many times the sum of the
+ * pixels' variances (order 2), or third cumulants (3), the sum over a large square of pixels has, if noise is as large
+ * between pixels as on them: with s(x) the sum of all pixels' filters, (integral of f s^(order-1) / integral of f^order)^2. 2.25
+ * and 4 for a tent of radius 1. */
+double pixel_filter_sharing(const struct pixel_filter *f, int order);
+
+#endif
