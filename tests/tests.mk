@@ -199,6 +199,12 @@ catalogue: all $(BUILD)/libassay.a $(BUILD)/tests/make_catalogue
 diagnose-rates: catalogue $(BUILD)/tests/diagnose_rates
 	$(BUILD)/tests/diagnose_rates $(BUILD) >$(BUILD)/diagnose_rates.md
 	cp $(BUILD)/diagnose_rates.md golden/diagnose/README.md
+#: make collada-cts  every file of Khronos' COLLADA conformance suite (COLLADA_CTS=DIR: a copy of it) through build/pathtracer
+collada-cts: all
+	tests/studies/collada_cts/collada_cts.py $(BUILD)/pathtracer $(COLLADA_CTS)
+#: make blender-scenes  scenes made in Blender, through its COLLADA exporter, against Cycles (needs Blender; a minute)
+blender-scenes: all
+	tests/studies/blender/blender.sh $(BUILD)
 #: make calibrate  measure error rates and power, write tests/studies/calibration/ (SHARE=0.01: a part of it)
 calibrate: $(BUILD)/tests/make_calibration
 	$< --threads $(shell nproc) $(if $(SHARE),--share $(SHARE) $(BUILD)/calibration,tests/studies/calibration)
@@ -244,5 +250,5 @@ print-libs:
 print-kernels:
 	@$(foreach k,$(BY_ISA),$(foreach i,$(call isas_of,$(k)),echo $(k)_$(i).c $(k).c $(call isa_flags,$(i));))
 
-.PHONY: check lint order threads tsan faults pairs slurm distros scale-live large scale coverage fuzz mutants machine-mutants catalogue diagnose-rates calibrate anchors \
+.PHONY: check lint order collada-cts blender-scenes threads tsan faults pairs slurm distros scale-live large scale coverage fuzz mutants machine-mutants catalogue diagnose-rates calibrate anchors \
   bench bench-rays bvh-table rubric-bugs writeup pictures print-compile print-sanitize print-sanitized print-libs print-kernels programs-san programs-clang programs-fuzz programs-no-memory

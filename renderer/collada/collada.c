@@ -302,8 +302,12 @@ static void write_notes(struct loader *ld)
 {
     static const char *const LEFT_OUT[NUM_LEFT_OUT] = {
         "%u animations, controllers or bodies are left out: a still image shows where things stand",
-        "%u groups of lines are left out", "%u surfaces are wholly transparent, so left out",
-        "%u surfaces without material are grey (0.8)"};
+        "%u groups of lines are left out",
+        "%u surfaces are wholly transparent, so left out",
+        "%u surfaces without material are grey (0.8)",
+        "%u lights of Blender have no radius here: set theirs to 0, or give an area light",
+        "%u spots of Blender have a sharp edge here: set their blend to 0",
+        "%u upright cameras of Blender: right if its sensor fit is horizontal"};
     for (int i = 0; i < NUM_LEFT_OUT; i++) {
         char text[128];
         snprintf(text, sizeof text, LEFT_OUT[i], ld->num_left_out[i]);

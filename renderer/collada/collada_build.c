@@ -115,6 +115,11 @@ static bool reserve_triangle(struct loader *ld)
     return true;
 }
 
+vec3 build_to_float(dvec3 v)
+{
+    return v3((float)v.x, (float)v.y, (float)v.z);
+}
+
 static bool to_world(struct loader *ld, const xmlNode *n, const mat4 *m, dvec3 p, vec3 *out)
 {
     dvec3 w = mat4_point(m, p);

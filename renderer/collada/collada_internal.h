@@ -1,6 +1,6 @@
 /* What the files of the COLLADA loader share: the loader's state, the reading of XML
  * (collada_xml.c, collada_text.c), of meshes (collada_mesh.c), materials (collada_material.c),
- * lights and cameras (collada_light.c), and the growing scene (collada_build.c). Every bool
+ * lights (collada_light.c), cameras (collada_camera.c), and the growing scene (collada_build.c). Every bool
  * function fails with "path:line: what" in loader.err. */
 #ifndef ASSAY_COLLADA_INTERNAL_H
 #define ASSAY_COLLADA_INTERNAL_H
@@ -80,6 +80,9 @@ enum left_out {
     LEFT_OUT_LINES,
     LEFT_OUT_TRANSPARENT,
     LEFT_OUT_MATERIAL,
+    LEFT_OUT_RADIUS,
+    LEFT_OUT_BLEND,
+    LEFT_OUT_UPRIGHT,
     NUM_LEFT_OUT
 };
 #define NO_SURFACE UINT32_MAX /* a material that lets everything through */
@@ -98,8 +101,9 @@ struct loader {
     struct err *err;
     bool parse_failed;
     enum dialect dialect;
-    bool is_course_export; /* taken for a file of the assignment by the program that wrote it */
-    unsigned num_specular; /* materials in use whose highlight the dialect leaves out */
+    double blender_version; /* that wrote the scene; 0: another program */
+    bool is_course_export;  /* taken for a file of the assignment by the program that wrote it */
+    unsigned num_specular;  /* materials in use whose highlight the dialect leaves out */
     unsigned num_left_out[NUM_LEFT_OUT];
     bool is_transparent;            /* the material that is being read */
     const xmlNode *instance_effect; /* of the material that is being read */
@@ -217,6 +221,8 @@ struct field {
         sizeof((const struct field[]){__VA_ARGS__}) / sizeof(struct field)
 /* One that has to be there. */
 #define FIELD_OF_COLOR(name, out, most) name, FIELD_COLOR, out, true, .hi = (most)
+#define FIELD_OF_LENGTH(name, out, needed)                                                         \
+    name, FIELD_NUMBER, out, needed, .lo = 1e-300, .hi = 1e300
 /* Reads all children of n, which are those fields in any order, each once at most. */
 bool field_read_all(struct loader *ld, const xmlNode *n, const struct field *fields, size_t count);
 
@@ -269,6 +275,7 @@ void *build_grow(struct loader *ld, void *data, size_t size, size_t count, size_
 void build_copy_name(char *out, size_t size, const char *name);
 bool build_add_material(struct loader *ld, const struct material *m, uint32_t *index);
 bool build_add_light(struct loader *ld, const struct light *l);
+vec3 build_to_float(dvec3 v);
 /* A new object that the following triangles and spheres belong to. */
 bool build_begin_object(struct loader *ld, const char *name, const char *symbol, uint32_t material,
                         bool is_lamp);
@@ -337,6 +344,8 @@ bool light_instance(struct loader *ld, const xmlNode *instance, const xmlNode *l
                     const char *node_name, const mat4 *m);
 /* What all ambient lights give together becomes the environment. */
 bool light_finish(struct loader *ld);
+
+/* collada_camera.c */
 bool camera_instance(struct loader *ld, const xmlNode *instance, const xmlNode *camera,
                      const char *node_name, const mat4 *m);
 /* What the assignment uses for a file without a camera. */

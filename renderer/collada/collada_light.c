@@ -1,18 +1,11 @@
-/* <light> and <camera> as they are instanced. */
+/* <light> as it is instanced. */
 #include "collada_internal.h"
 #include "renderer/scene/environment.h"
 
 #include <float.h>
 #include <string.h>
 
-static const double DEGREE = 3.14159265358979323846 / 180;
-
-#define LENGTH(name, out, needed) name, FIELD_NUMBER, out, needed, .lo = 1e-300, .hi = 1e300
-
-static vec3 to_float(dvec3 v)
-{
-    return v3((float)v.x, (float)v.y, (float)v.z);
-}
+static const double PI = 3.14159265358979323846;
 
 /* The attenuation of the light as the file has it. */
 #define ATTENUATION(a)                                                                             \
@@ -46,7 +39,7 @@ static bool place_light(struct loader *ld, const xmlNode *n, const mat4 *m, stru
     dvec3 p = mat4_point(m, d3(0, 0, 0));
     if (!(fabs(p.x) <= FARTHEST && fabs(p.y) <= FARTHEST && fabs(p.z) <= FARTHEST))
         return fail_at(ld, n, "the light is beyond %g", FARTHEST);
-    l->position = to_float(p);
+    l->position = build_to_float(p);
     return true;
 }
 
@@ -76,11 +69,11 @@ static bool add_spot(struct loader *ld, const xmlNode *n, const char *name, cons
                    {"falloff_exponent", FIELD_FLOAT, &l.exponent, .lo = 0, .hi = 1e6})) ||
         !set_attenuation(ld, n, a, &l))
         return false;
-    l.cos_cutoff = angle < 180 ? (float)cos(0.5 * angle * DEGREE) : 0;
+    l.cos_cutoff = angle < 180 ? (float)cos(0.5 * angle * (PI / 180)) : 0;
     dvec3 backward = mat4_column(m, 2);
     if (!d3_normalize(&backward))
         return fail_at(ld, n, "the light has no direction");
-    l.axis = neg(to_float(backward));
+    l.axis = neg(build_to_float(backward));
     return place_light(ld, n, m, &l) && build_add_light(ld, &l);
 }
 
@@ -95,7 +88,7 @@ static bool add_directional(struct loader *ld, const xmlNode *n, const char *nam
     dvec3 to_light = ld->dialect == DIALECT_CGL ? mat4_point(m, d3(0, 0, -1)) : mat4_column(m, 2);
     if (!d3_normalize(&to_light))
         return fail_at(ld, n, "the light has no direction");
-    l.to_light = to_float(to_light);
+    l.to_light = build_to_float(to_light);
     return build_add_light(ld, &l);
 }
 
@@ -130,8 +123,8 @@ static bool add_rectangle(struct loader *ld, const xmlNode *n, const char *name,
     rgb radiance;
     return field_read_all(ld, n,
                           FIELDS({FIELD_OF_COLOR("radiance", &radiance, 0)},
-                                 {LENGTH("width", &width, true)},
-                                 {LENGTH("height", &height, true)})) &&
+                                 {FIELD_OF_LENGTH("width", &width, true)},
+                                 {FIELD_OF_LENGTH("height", &height, true)})) &&
            add_lamp(ld, n, name, m, width, height, radiance);
 }
 
@@ -174,6 +167,65 @@ static const struct light_tag {
     {"CGL common", "ambient", add_ambient}, {"CGL common", "spot", add_spot},
 };
 
+/* What Blender's exporter wrote beside, from 2.80 on, of a light that is as it wrote it; else NULL. */
+static const xmlNode *blender_technique(const struct loader *ld, const xmlNode *light,
+                                        const xmlNode *kind)
+{
+    const xmlNode *extra = element_child_named(light, "extra"),
+                  *t = extra != NULL ? element_child_named(extra, "technique") : NULL,
+                  *falloff = element_child_named(kind, "constant_attenuation");
+    const char *profile = t != NULL ? element_attribute(t, "profile") : NULL;
+    bool is_its = profile != NULL && strcmp(profile, "blender") == 0 && falloff != NULL &&
+                  falloff->children != NULL &&
+                  strcmp((const char *)falloff->children->content, "1") == 0;
+    return is_its && ld->blender_version >= 2.8 && ld->dialect == DIALECT_COLLADA ? t : NULL;
+}
+
+/* Blender's exporter writes colour times watts as if they were an intensity, with a falloff that no
+ * renderer of Blender's has, and an area light as a point. Of the light added last, which is a point
+ * or a spot, to what Cycles takes it for. */
+static bool mean_blender(struct loader *ld, const xmlNode *technique, const char *name,
+                         const mat4 *m)
+{
+    enum { BLENDER_AREA = 4, BLENDER_SQUARE = 0, BLENDER_RECTANGLE = 1 };
+    struct light *l = &ld->scene.lights[ld->scene.num_lights - 1];
+    double type, shape, blend, size[2], sign;
+    const struct {
+        const char *name;
+        double *to;
+    } numbers[] = {{"type", &type},
+                   {"area_shape", &shape},
+                   {"spotblend", &blend},
+                   {"area_size", &size[0]},
+                   {"area_sizey", &size[1]}};
+    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) {
+        const xmlNode *n = element_child_named(technique, numbers[i].name);
+        if (n == NULL)
+            return fail_at(ld, technique, "a light of Blender without <%s>", numbers[i].name);
+        if (!text_read_exactly(ld, n, numbers[i].to, 1))
+            return false;
+    }
+    if (type != BLENDER_AREA) {
+        l->value = rgb_scale(l->value, (float)(ld->unit * ld->unit / (4 * PI)));
+        l->attenuation[0] = l->attenuation[1] = 0;
+        l->attenuation[2] = 1;
+        l->exponent = l->kind == LIGHT_SPOT; /* Cycles' cones are dimmer towards their edge */
+        ld->num_left_out[LEFT_OUT_RADIUS]++;
+        ld->num_left_out[LEFT_OUT_BLEND] += l->kind == LIGHT_SPOT && blend > 0;
+        return true;
+    }
+    if (shape != BLENDER_SQUARE && shape != BLENDER_RECTANGLE)
+        return fail_at(ld, technique, "a round area light of Blender is not supported");
+    if (shape == BLENDER_SQUARE)
+        size[1] = size[0];
+    if (!(size[0] > 0 && size[1] > 0))
+        return fail_at(ld, technique, "an area light of Blender without area");
+    rgb radiance = rgb_scale(l->value, (float)(0.25 / (size[0] * size[1])));
+    ld->scene.num_lights--;
+    return build_transform_sign(ld, technique, m, &sign) &&
+           add_lamp(ld, technique, name, m, size[0], size[1], radiance);
+}
+
 bool light_instance(struct loader *ld, const xmlNode *instance, const xmlNode *light,
                     const char *node_name, const mat4 *m)
 {
@@ -194,149 +246,10 @@ bool light_instance(struct loader *ld, const xmlNode *instance, const xmlNode *l
         return fail_at(ld, technique, "<light> without a kind");
     if (element_next_sibling(kind) != NULL)
         return element_fail_unexpected(ld, element_next_sibling(kind));
+    const xmlNode *blender = technique == common ? blender_technique(ld, light, kind) : NULL;
     for (size_t i = 0; i < sizeof LIGHT_TAGS / sizeof *LIGHT_TAGS; i++)
         if (element_is(kind, LIGHT_TAGS[i].name) && strstr(LIGHT_TAGS[i].profiles, profile) != NULL)
-            return LIGHT_TAGS[i].add(ld, kind, node_name, m);
+            return LIGHT_TAGS[i].add(ld, kind, node_name, m) &&
+                   (blender == NULL || mean_blender(ld, blender, node_name, m));
     return fail_at(ld, kind, "unknown light tag '%.60s'", (const char *)kind->name);
-}
-
-static bool set_clipping(struct loader *ld, const xmlNode *n, double near, double far,
-                         struct scene_camera *c)
-{
-    if (!(far > near) || !(far * ld->unit <= FARTHEST))
-        return fail_at(ld, n, "<zfar> is not beyond <znear>, or something is out of range");
-    c->near = (float)(near * ld->unit);
-    c->far = (float)(far * ld->unit);
-    return true;
-}
-
-static bool read_orthographic(struct loader *ld, const xmlNode *n, struct scene_camera *c)
-{
-    double near, far, aspect = 0, x = 0, y = 0;
-    if (!field_read_all(ld, n,
-                        FIELDS({LENGTH("xmag", &x, false)}, {LENGTH("ymag", &y, false)},
-                               {"aspect_ratio", FIELD_NUMBER, &aspect, .lo = 1e-6, .hi = 1e6},
-                               {LENGTH("znear", &near, true)}, {LENGTH("zfar", &far, true)})))
-        return false;
-    if (x == 0 && y == 0)
-        return fail_at(ld, n, "<orthographic> needs <xmag> or <ymag>");
-    if (fmax(x, y) * ld->unit > FARTHEST)
-        return fail_at(ld, n, "<xmag> or <ymag> is out of range");
-    c->xmag = (float)(x * ld->unit);
-    c->ymag = (float)(y * ld->unit);
-    c->aspect = (float)aspect;
-    return set_clipping(ld, n, near, far, c);
-}
-
-static bool read_perspective(struct loader *ld, const xmlNode *n, struct scene_camera *c)
-{
-    double near, far, aspect = 0, x = 0, y = 0;
-    if (!field_read_all(ld, n,
-                        FIELDS({"xfov", FIELD_NUMBER, &x, .lo = 1e-6, .hi = 179.9999},
-                               {"yfov", FIELD_NUMBER, &y, .lo = 1e-6, .hi = 179.9999},
-                               {"aspect_ratio", FIELD_NUMBER, &aspect, .lo = 1e-6, .hi = 1e6},
-                               {LENGTH("znear", &near, true)}, {LENGTH("zfar", &far, true)})))
-        return false;
-    c->hfov = (float)(x * DEGREE);
-    c->vfov = (float)(y * DEGREE);
-    c->aspect = (float)aspect;
-    if (ld->dialect == DIALECT_CGL) {
-        if (c->hfov == 0)
-            c->hfov = (float)(50 * DEGREE);
-        if (c->vfov == 0 && c->aspect == 0)
-            return fail_at(ld, n, "<perspective> needs <yfov> or <aspect_ratio>");
-        if (c->vfov == 0)
-            c->vfov = 2 * atanf(tanf(c->hfov / 2) / c->aspect);
-    }
-    if (c->hfov == 0 && c->vfov == 0)
-        return fail_at(ld, n, "<perspective> needs <xfov> or <yfov>");
-    return set_clipping(ld, n, near, far, c);
-}
-
-/* The assignment looks at the scene from the direction c, with world +Y up; straight from above or
- * below its right is +X. */
-static void look_cgl(struct scene_camera *out, dvec3 c)
-{
-    double azimuth = atan2(c.x, c.z);
-    dvec3 right = d3(cos(azimuth), 0, -sin(azimuth));
-    out->right = to_float(right);
-    out->up = to_float(d3_cross(c, right));
-    out->backward = to_float(c);
-}
-
-static bool place(struct loader *ld, const xmlNode *n, const mat4 *m, struct scene_camera *out)
-{
-    dvec3 eye = mat4_point(m, d3(0, 0, 0));
-    if (!(fabs(eye.x) <= FARTHEST && fabs(eye.y) <= FARTHEST && fabs(eye.z) <= FARTHEST))
-        return fail_at(ld, n, "the camera is beyond %g", FARTHEST);
-    out->eye = to_float(eye);
-    if (ld->dialect == DIALECT_CGL) {
-        dvec3 c = mat4_point(m, d3(0, 0, -1));
-        if (!d3_normalize(&c))
-            return fail_at(ld, n, "the camera has no direction");
-        look_cgl(out, c);
-        return true;
-    }
-    double sign;
-    if (!build_transform_sign(ld, n, m, &sign))
-        return false;
-    dvec3 x = mat4_column(m, 0), y = mat4_column(m, 1), z = mat4_column(m, 2);
-    if (!d3_normalize(&x) || !d3_normalize(&y) || !d3_normalize(&z))
-        return fail_at(ld, n, "the transforms above are singular");
-    if (fabs(d3_dot(x, y)) > 1e-4 || fabs(d3_dot(y, z)) > 1e-4 || fabs(d3_dot(z, x)) > 1e-4)
-        return fail_at(ld, n, "the transforms above shear the camera");
-    if (sign < 0)
-        return fail_at(ld, n, "the transforms above mirror the camera: not supported");
-    out->right = to_float(x);
-    out->up = to_float(y);
-    out->backward = to_float(z);
-    return true;
-}
-
-bool camera_instance(struct loader *ld, const xmlNode *instance, const xmlNode *camera,
-                     const char *node_name, const mat4 *m)
-{
-    xmlNode *optics, *common = NULL, *kind = NULL;
-    struct scene *s = &ld->scene;
-    struct scene_camera c = {.present = true};
-    if (!element_only_children(ld, instance, "extra") ||
-        !element_only_children(ld, camera, "asset optics imager extra") ||
-        !element_one_child(ld, camera, "optics", &optics))
-        return false;
-    if (optics != NULL && (!element_only_children(ld, optics, "technique_common technique extra") ||
-                           !element_one_child(ld, optics, "technique_common", &common)))
-        return false;
-    if (common != NULL)
-        kind = element_first_child(common);
-    if (kind == NULL)
-        return fail_at(ld, camera, "<camera> without <optics> of a kind");
-    if (element_next_sibling(kind) != NULL)
-        return element_fail_unexpected(ld, element_next_sibling(kind));
-    bool flat = element_is(kind, "orthographic") && ld->dialect == DIALECT_COLLADA;
-    if (!flat && !element_is(kind, "perspective"))
-        return element_fail_unexpected(ld, kind);
-    if (!(flat ? read_orthographic(ld, kind, &c) : read_perspective(ld, kind, &c)) ||
-        !place(ld, instance, m, &c))
-        return false;
-    build_copy_name(c.name, sizeof c.name, node_name);
-    struct scene_camera *grown =
-        build_grow(ld, s->cameras, sizeof *grown, s->num_cameras, &ld->cap_cameras);
-    if (grown == NULL)
-        return false;
-    s->cameras = grown;
-    if (s->num_cameras == 0 || ld->dialect == DIALECT_CGL)
-        s->camera = c;
-    grown[s->num_cameras++] = c;
-    return true;
-}
-
-void camera_default(struct loader *ld)
-{
-    struct scene_camera *c = &ld->scene.camera;
-    c->hfov = (float)(50 * DEGREE);
-    c->vfov = (float)(35 * DEGREE);
-    c->aspect = tanf(c->hfov / 2) / tanf(c->vfov / 2);
-    c->near = 0.01f;
-    c->far = 100;
-    look_cgl(c, d3(0, 0, 1));
 }

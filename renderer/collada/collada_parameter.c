@@ -53,16 +53,22 @@ static bool read_child_word(struct loader *ld, const xmlNode *n, const char *nam
     return *word != NULL;
 }
 
-/* COLLADA 1.4: <sampler2D> names a <surface>, which names an <image>. */
+/* COLLADA 1.4: <sampler2D> names a <surface>, which names an <image> (<init_from>, or <all> of
+ * <init_planar>). */
 static bool follow_surface(struct loader *ld, const xmlNode *sampler, const xmlNode **image)
 {
     char *surface_name = NULL, *image_name = NULL;
-    const xmlNode *surface;
+    const xmlNode *surface, *planar, *all = NULL;
+    const char *ref = NULL;
     bool ok = read_child_word(ld, sampler, "source", &surface_name) &&
               parameter_get(ld, sampler, surface_name, "surface", &surface) &&
-              read_child_word(ld, surface, "init_from", &image_name) &&
-              (image_name != NULL || fail_at(ld, surface, "<surface> without <init_from>")) &&
-              reference_find(ld, surface, image_name, "image", image);
+              read_child_word(ld, surface, "init_from", &image_name);
+    if (ok && (planar = element_child_named(surface, "init_planar")) != NULL)
+        all = element_child_named(planar, "all");
+    if (ok)
+        ref = image_name != NULL ? image_name : all != NULL ? element_attribute(all, "ref") : NULL;
+    ok = ok && (ref != NULL || fail_at(ld, surface, "<surface> without <init_from>")) &&
+         reference_find(ld, surface, ref, "image", image);
     free(surface_name);
     free(image_name);
     return ok;

@@ -241,19 +241,16 @@ static bool check_root(struct loader *ld, const xmlNode *root)
     return true;
 }
 
-/* The course's scenes without CGL extras (meshedit, keenan, simple) are as Blender 2.72 and 2.74 wrote them, which no other
- * program of these days does. */
-static bool is_course_export(const xmlNode *root)
+/* 0 for another program. */
+static double blender_version(const xmlNode *root)
 {
-    static const char *const TOOLS[] = {"Blender 2.72", "Blender 2.74"};
     const xmlNode *asset = element_child_named(root, "asset"),
                   *by = asset != NULL ? element_child_named(asset, "contributor") : NULL,
                   *tool = by != NULL ? element_child_named(by, "authoring_tool") : NULL;
     const xmlNode *text = tool != NULL ? tool->children : NULL;
-    for (size_t i = 0; text != NULL && text->content != NULL && i < 2; i++)
-        if (strncmp((const char *)text->content, TOOLS[i], strlen(TOOLS[i])) == 0)
-            return true;
-    return false;
+    bool is_blender = text != NULL && text->content != NULL &&
+                      strncmp((const char *)text->content, "Blender ", 8) == 0;
+    return is_blender ? strtod((const char *)text->content + 8, NULL) : 0;
 }
 
 bool xml_open(struct loader *ld, const char *path, struct text_input *in, struct document **out)
@@ -282,8 +279,13 @@ bool xml_open(struct loader *ld, const char *path, struct text_input *in, struct
     const xmlNode *root = xmlDocGetRootElement(d->doc);
     if (!check_root(ld, root) || !survey(ld, d, &has_cgl))
         return false;
+    if (ld->num_documents == 1)
+        ld->blender_version = blender_version(root);
     if (ld->dialect == DIALECT_AUTO) {
-        ld->is_course_export = !has_cgl && is_course_export(root);
+        /* The course's scenes without CGL extras (meshedit, keenan, simple) are as these wrote them, which no
+         * other program of these days does. */
+        ld->is_course_export =
+            !has_cgl && (ld->blender_version == 2.72 || ld->blender_version == 2.74);
         ld->dialect = has_cgl || ld->is_course_export ? DIALECT_CGL : DIALECT_COLLADA;
     }
     return true;

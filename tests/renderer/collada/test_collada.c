@@ -332,11 +332,11 @@ TEST(materials)
 }
 TEST(lights_and_cameras)
 {
-    run_file("tests/renderer/collada/light.cases", 38);
+    run_file("tests/renderer/collada/light.cases", 47);
 }
 TEST(refused)
 {
-    run_file("tests/renderer/collada/refused.cases", 72);
+    run_file("tests/renderer/collada/refused.cases", 73);
 }
 
 TEST(microfacet_of_ours)
