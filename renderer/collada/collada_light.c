@@ -142,19 +142,19 @@ static bool add_ambient(struct loader *ld, const xmlNode *n, const char *name, c
     (void)m;
     if (!field_read_all(ld, n, FIELDS({FIELD_OF_COLOR("color", &color, 0)})))
         return false;
+    bool is_first = rgb_is_zero(ld->ambient) && !rgb_is_zero(color);
     ld->ambient = rgb_add(ld->ambient, color);
-    return true;
+    return !is_first || build_add_light(ld, &(struct light){.kind = LIGHT_ENVIRONMENT});
 }
 
 bool light_finish(struct loader *ld)
 {
-    struct light l = {.kind = LIGHT_ENVIRONMENT};
     if (rgb_is_zero(ld->ambient))
         return true;
     ld->scene.environment = ld->dialect == DIALECT_CGL
                                 ? environment_upper_half(ld->ambient, ld->err)
                                 : environment_constant(ld->ambient, ld->err);
-    return ld->scene.environment != NULL ? build_add_light(ld, &l) : fail_memory(ld);
+    return ld->scene.environment != NULL || fail_memory(ld);
 }
 
 /* To support one more, give it a reader here. A technique of no profile is <technique_common>. */

@@ -283,6 +283,10 @@ bool material_get(struct loader *ld, const xmlNode *instance, const xmlNode *use
             return false;
         if (symbol != NULL && strcmp(s, symbol) != 0)
             continue;
+        if (match != NULL && ld->dialect == DIALECT_COLLADA && symbol == NULL && group != NULL) {
+            match = NULL; /* which of them nobody says */
+            break;
+        }
         if (match != NULL && ld->dialect == DIALECT_COLLADA)
             return symbol != NULL ? fail_at(ld, c, "a second binding of symbol '%.60s'", s)
                                   : fail_at(ld, c, "two materials for one surface");

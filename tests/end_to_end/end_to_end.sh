@@ -55,7 +55,14 @@ expect "environment map of 8 bits" 3 "must be an .exr or .hdr" \
 expect "adaptive sobol" 3 "independent" \
     "$san_pathtracer" -a 8 0.1 --sampler sobol -f "$tmp/x.exr" $scene
 expect "missing scene" 3 "nowhere.dae" "$san_pathtracer" -f "$tmp/x.exr" nowhere.dae
-expect "missing camera file" 3 "nocamera" "$san_pathtracer" $small -c nocamera -f "$tmp/x.exr" $scene
+expect "missing camera" 3 "'nocamera' is neither a camera of the scene" \
+    "$san_pathtracer" $small -c nocamera -f "$tmp/x.exr" $scene
+parts=tests/fuzz/seeds/collada-parts.dae
+expect "cameras of a scene" 0 "eye: orthographic, 12 x 0" "$san_pathtracer" --list-cameras $parts
+expect "the first of several" 0 "first of 2 cameras, 'eye'" "$san_pathtracer" -r 8 8 -s 1 -f "$tmp/x.exr" $parts
+expect "another camera" 0 "" "$san_pathtracer" $small -c other -f "$tmp/x.exr" $parts
+expect "a lens without perspective" 3 "a lens needs a perspective camera" \
+    "$san_pathtracer" $small -b 0.1 -f "$tmp/x.exr" $parts
 expect "unwritable output" 3 "/nonexistent/x.exr" \
     "$san_pathtracer" $small -f /nonexistent/x.exr $scene
 # Found before the render, which would take days.

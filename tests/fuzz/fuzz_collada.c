@@ -70,6 +70,12 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         check_scene(&s);
         if (!camera_init(&c, &s, 40, 30, &e))
             fuzz_check_line(&e, NULL);
+        for (uint32_t k = 0; k < s.num_cameras; k++) {
+            fuzz_require(scene_choose_camera(&s, s.cameras[k].name), "a camera without its name");
+            fuzz_require(camera_init(&c, &s, 40, 30, &e), "a camera that is none");
+            ray r = camera_ray(&c, 3, 4, 0.5f, 0.5f);
+            fuzz_require(finite3(r.o) && fabsf(length(r.d) - 1) < 1e-3f, "a ray that is none");
+        }
         scene_free(&s);
     }
     return 0;

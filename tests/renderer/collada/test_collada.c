@@ -328,7 +328,7 @@ TEST(geometry)
 }
 TEST(materials)
 {
-    run_file("tests/renderer/collada/look.cases", 51);
+    run_file("tests/renderer/collada/look.cases", 52);
 }
 TEST(lights_and_cameras)
 {

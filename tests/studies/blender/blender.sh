@@ -10,7 +10,7 @@ failed=0
 compare() {
     local size verdict
     size=$(sed -n 's/^size //p' "$folder/$1.size")
-    "$build/pathtracer" -q -t "$threads" -s 256 -m 5 -r $size -f "$folder/ours.exr" "$2" >/dev/null
+    "$build/pathtracer" -q -t "$threads" -s 256 -m 5 -r "$size" -f "$folder/ours.exr" "$2" >/dev/null
     "$build/assay" compare "$folder/ours.exr" "$folder/$1.exr" >"$folder/verdict" || true
     verdict=$(sed -n '1s/:.*//p' "$folder/verdict")
     echo "| $4 | $verdict | $(sed -n '2s/, smallest.*//p' "$folder/verdict" | sed 's/difference //') |"
@@ -22,7 +22,7 @@ echo "|---|---|---|"
 for name in first second third edges; do
     blender -b --factory-startup -noaudio --python-exit-code 3 -P "$here/scenes.py" -- "$name" "$folder" 256 "$threads" \
         >"$folder/log" 2>&1 || { tail -5 "$folder/log"; exit 1; }
-    oiiotool --info "$folder/$name.exr" | sed 's/.*: *\([0-9]*\) x *\([0-9]*\),.*/size \1 \2/' >"$folder/$name.size"
+    oiiotool --info "$folder/$name.exr" | sed 's/.*: *\([0-9]*\) x *\([0-9]*\),.*/size \1x\2/' >"$folder/$name.size"
     expected="NO DIFFERENCE FOUND"
     [ $name != edges ] || expected=DIFFERENT # known: see the page
     compare $name "$folder/$name.dae" "$expected" $name
