@@ -1,5 +1,5 @@
-/* What a user waits for: the course's own jobs by the program, its normal images against brute force, and
- * the way from a file to the first ray. */
+/* What a user waits for: the course's own jobs by the program, its normal images against brute force, the way from a
+ * file to the first ray, and a comparison. */
 #include "bench.h"
 #include "bench_scenes.h"
 #include "bench_sets.h"
@@ -13,6 +13,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 /* CPU seconds of the course staff's program for the same job, 2019: ../shared/notes/performance.md. */
 static const struct {
@@ -174,10 +175,58 @@ static bool start_job(const struct bench_options *o, int i, json_t *jobs, struct
     return ok;
 }
 
+/* The harness: `assay compare` of two renders with seeds of their own. */
+static bool compare_job(const struct bench_options *o, int width, int height, json_t *jobs,
+                        struct err *e)
+{
+    char text[2][16], file[2][4096], log[4096], assay[4096], program[4096];
+    double cpu[BENCH_MAX_ROUNDS];
+    snprintf(text[0], sizeof text[0], "%d", o->smoke ? 64 : width);
+    snprintf(text[1], sizeof text[1], "%d", o->smoke ? 36 : height);
+    snprintf(log, sizeof log, "%s/job.log", o->out);
+    snprintf(program, sizeof program, "%s/pathtracer", o->build);
+    snprintf(assay, sizeof assay, "%s/assay", o->build);
+    for (int k = 0; k < 2; k++) {
+        snprintf(file[k], sizeof file[k], "%s/side%d.exr", o->out, k);
+        const char *const render[] = {program,
+                                      "-q",
+                                      "-s",
+                                      "16",
+                                      "-m",
+                                      "3",
+                                      "-r",
+                                      text[0],
+                                      text[1],
+                                      "--seed",
+                                      k == 0 ? "1" : "2",
+                                      "-f",
+                                      file[k],
+                                      "reference/scenes/41_cornell.dae",
+                                      NULL};
+        if (!process_run(&(struct process){.argv = render, .log = log}, NULL, e))
+            return false;
+    }
+    const char *const compare[] = {assay,  "compare", "-q",    "--accept-mdb",
+                                   "1000", file[0],   file[1], NULL};
+    for (int k = 0; k < o->rounds; k++) {
+        struct process_usage usage;
+        if (!process_run(&(struct process){.argv = compare, .log = log}, &usage, e))
+            return false;
+        cpu[k] = usage.cpu_s;
+    }
+    const double median = bench_median(cpu, o->rounds);
+    printf("assay compare         moments of %s x %s, 16 samples %9.2f CPU s\n", text[0], text[1],
+           median);
+    json_array_append_new(
+        jobs, json_pack("{s:i,s:i,s:f}", "width", width, "height", height, "cpu_s", median));
+    return unlink(file[0]) == 0 && unlink(file[1]) == 0;
+}
+
 json_t *bench_jobs(const struct bench_options *o, bool *wrong, struct err *e)
 {
     (void)wrong;
-    json_t *paths = json_array(), *normals = json_array(), *start = json_array();
+    json_t *paths = json_array(), *normals = json_array(), *start = json_array(),
+           *compares = json_array();
     bool ok = true;
     printf("The program's own time, start and files included; medians of %d rounds\n", o->rounds);
     for (int i = 0; ok && i < NUM_PATHS; i++)
@@ -186,7 +235,10 @@ json_t *bench_jobs(const struct bench_options *o, bool *wrong, struct err *e)
         ok = normals_job(o, i, normals, e);
     for (int i = 0; ok && i < NUM_NORMALS; i++)
         ok = start_job(o, i, start, e);
-    json_t *all = json_pack("{s:o,s:o,s:o}", "paths", paths, "normals", normals, "start", start);
+    if (ok && bench_wanted(o, "41_cornell"))
+        ok = compare_job(o, 1920, 1080, compares, e) && compare_job(o, 3840, 2160, compares, e);
+    json_t *all = json_pack("{s:o,s:o,s:o,s:o}", "paths", paths, "normals", normals, "start", start,
+                            "compare", compares);
     if (ok)
         return all;
     json_decref(all);
