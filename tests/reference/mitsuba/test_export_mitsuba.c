@@ -228,6 +228,11 @@ TEST(what_it_has_not_is_refused)
         build_camera(&s, v3(0, 0, 0), 50);
         refuse(&s, NULL, bad[i].pattern);
     }
+    const rgb texel = {.1f, .2f, .3f};
+    struct scene painted = lit_by(sun);
+    painted.materials[0].reflectance_map =
+        build_texture(&painted, 1, 1, &texel, true, TEXTURE_WRAP);
+    refuse(&painted, NULL, "the texture of material");
     struct light light[] = {point, spot};
     light[0].attenuation[0] = 1;
     light[1].exponent = 2;

@@ -120,6 +120,11 @@ TEST(what_it_has_not_is_refused)
         struct scene s = triangle_of(bad[i].m);
         refuse(&s, bad[i].pattern);
     }
+    const rgb texel = {.1f, .2f, .3f};
+    struct scene painted = triangle_of((struct material){.reflectance = {1, 1, 1}});
+    painted.materials[0].reflectance_map =
+        build_texture(&painted, 1, 1, &texel, true, TEXTURE_WRAP);
+    refuse(&painted, "the texture of material");
     struct light light[] = {point, spot};
     light[0].attenuation[0] = 1;
     light[1].exponent = 1;
