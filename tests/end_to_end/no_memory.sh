@@ -63,6 +63,7 @@ no_memory "render: moments, layers and state" "${draw[@]}" -s 2 --aov --keep-sta
 no_memory "render: PNG and heat map" "${draw[@]}" -s 2 -c "$seeds/camera.info" --heatmap h.png -f x.png "$cornell"
 no_memory "render: a sky (.hdr)" "${draw[@]}" -s 2 -e "$seeds/picture.hdr" -f x.exr "$point"
 no_memory "render: a sky (.exr)" "${draw[@]}" -s 2 -e "$scenes/46_sky.exr" -f x.exr "$scenes/46_sky.dae"
+no_memory "render: textures" "${draw[@]}" -s 2 -f x.exr "$scenes/29_textures.dae"
 no_memory "render: the assignment's rule" "${draw[@]}" -s 24 -a 4 0.3 -f x.exr -f x.png "$point"
 no_memory "render: a pilot" "${draw[@]}" -s 24 --adaptive-unbiased 0.3 --pilot 4 -f x.exr -f x.png "$point"
 for accel in bruteforce centroid sah; do
@@ -74,6 +75,7 @@ no_memory "render: resumed" "${draw[@]}" -s 4 --resume x.exr --keep-state -f x.e
 
 no_memory "merge" "$assay" merge x.exr "$tmp/in/s1.exr" "$tmp/in/s2.exr"
 for format in json pov xml pbrt; do no_memory "export: $format" "$assay" export -o x.$format "$scenes/27_smooth_normals.dae"; done
+for format in json pov; do no_memory "export: textures, $format" "$assay" export -o x.$format "$scenes/29_textures.dae"; done
 for format in json pov xml; do no_memory "export: a sky, $format" "$assay" export -o x.$format "$scenes/46_sky.dae"; done
 
 # OpenImageIO, which reads what is no moments file, takes half a second to load: fewer.
