@@ -98,8 +98,8 @@ double texture_mean_luminance(const struct texture *t, const struct uv c[3], rgb
     /* Rows of triangles that stand, and between them of triangles that hang. */
     for (int i = 0; i < n; i++)
         for (int j = 0; i + j < n; j++)
-            for (int hangs = 0; hangs <= (i + j + 1 < n); hangs++) {
-                float off = hangs ? 2.0f / 3 : 1.0f / 3;
+            for (int part = 1; part <= (i + j + 1 < n ? 2 : 1); part++) {
+                const float off = (float)part / 3;
                 rgb c1 = texture_on_triangle(t, c, ((float)i + off) / (float)n,
                                              ((float)j + off) / (float)n);
                 sum += (double)rgb_luminance(rgb_mul(factor, c1));
