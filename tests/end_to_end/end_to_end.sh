@@ -449,6 +449,9 @@ if xmllint --noout "$tmp/c.xml" && grep -q 'thinlens' "$tmp/c.xml" && [ -s "$tmp
     [ "$(grep -c 'type="ply"' "$tmp/c.xml")" -eq "$(ls "$tmp"/c_object_*.ply | wc -l)" ]; then
     ok "the Mitsuba scene is XML, with its files"
 else not_ok "the Mitsuba scene is XML, with its files" "$(ls "$tmp"/c[._]*)"; fi
+for ending in json pov xml pbrt; do
+    expect "orthographic camera to .$ending" 3 "an orthographic camera" "$san_assay" export -o "$tmp/o.$ending" $parts
+done
 expect "export to pbrt" 0 "c.pbrt" "$san_assay" export -o "$tmp/c.pbrt" -b 0.1 -d 2 $scene
 expect "export: what pbrt has not" 3 "no environment image" \
     "$san_assay" export -o "$tmp/d.pbrt" -e "$tmp/a.exr" $scene

@@ -19,7 +19,7 @@ compare() {
 
 echo "| scene | verdict | difference of the mean, 95 % |"
 echo "|---|---|---|"
-for name in first second third edges; do
+for name in first second third parallel edges; do
     blender -b --factory-startup -noaudio --python-exit-code 3 -P "$here/scenes.py" -- "$name" "$folder" 256 "$threads" \
         >"$folder/log" 2>&1 || { tail -5 "$folder/log"; exit 1; }
     oiiotool --info "$folder/$name.exr" | sed 's/.*: *\([0-9]*\) x *\([0-9]*\),.*/size \1x\2/' >"$folder/$name.size"

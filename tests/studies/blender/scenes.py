@@ -54,7 +54,7 @@ def camera(location, rotation, size, **values):
     scene.render.resolution_x, scene.render.resolution_y = size
 
 
-def first():
+def first(area=True):
     """The one that lights were tuned on."""
     put(mesh.primitive_plane_add, (.6, .5, .4), size=10)
     put(mesh.primitive_cube_add, (.2, .4, .7), size=1.4, location=(-1.3, .3, .7), rotation=(0, 0, .5),
@@ -65,7 +65,8 @@ def first():
     light("POINT", 200, (1, .9, .8), (-2, -3, 3), shadow_soft_size=0)
     light("SUN", 1.5, (.8, .9, 1), (0, 0, 5), (.6, .3, 0), angle=0)
     light("SPOT", 400, (1, 1, 1), (3, -2, 4), (.5, .5, .2), shadow_soft_size=0, spot_size=math.radians(50), spot_blend=0)
-    light("AREA", 60, (1, .8, .6), (2.5, 1, 2.5), (.3, .9, 0), shape="RECTANGLE", size=.8, size_y=.4)
+    if area:
+        light("AREA", 60, (1, .8, .6), (2.5, 1, 2.5), (.3, .9, 0), shape="RECTANGLE", size=.8, size_y=.4)
     camera((.5, -7, 3.5), (1.15, 0, .05), (160, 120), lens=40)
 
 
@@ -106,7 +107,13 @@ def third():
     camera((5, -5, 3), (1.25, 0, .79), (90, 140), lens=35, sensor_fit="HORIZONTAL")
 
 
-{"first": first, "second": second, "third": third, "edges": lambda: second(True)}[NAME]()
+def parallel():
+    """The first by an orthographic camera, without the area light, whose shadow it would show."""
+    first(area=False)
+    scene.camera.data.type, scene.camera.data.ortho_scale = "ORTHO", 5.5
+
+
+{"parallel": parallel, "first": first, "second": second, "third": third, "edges": lambda: second(True)}[NAME]()
 bpy.ops.wm.collada_export(filepath=f"{FOLDER}/{NAME}.dae", apply_modifiers=True)
 for material in bpy.data.materials:
     if material.use_nodes:
