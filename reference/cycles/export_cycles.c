@@ -54,17 +54,18 @@ static json_t *camera_json(const struct scene *s, const struct camera *c, struct
                      (double)c->lens_radius, "focal_distance", (double)c->focal_distance);
 }
 
-/* Cycles' width is twelve sigmas, beyond which less than a float's rounding is cut off, and Blender's limit 10 pixels. */
+/* Cycles cuts its Gauss off at 6 sigmas, beyond which less than a float's rounding is left. Blender's width is four sigmas, ten
+ * pixels at most. */
 static bool check_filter(const struct pixel_filter *f, struct err *e)
 {
     char text[PIXEL_FILTER_TEXT];
     if (f->radius == 0 ||
-        (f->kind == PIXEL_FILTER_GAUSS && f->radius == 6 * f->sigma && f->radius <= 5))
+        (f->kind == PIXEL_FILTER_GAUSS && fabs(f->radius - 6 * f->sigma) < 1e-6 && f->sigma <= 2.5))
         return true;
     pixel_filter_print(f, text);
     return err_set(
         e,
-        "Cycles: a pixel filter %s, not the box of one pixel or gauss:SIGMA:(6 SIGMA) with at most 5 pixels",
+        "Cycles: a pixel filter %s, not the box of one pixel or gauss:SIGMA:(6 SIGMA) with SIGMA up to 2.5",
         text);
 }
 
@@ -95,7 +96,7 @@ bool export_cycles(const struct scene *s, const struct camera *c, int depth, con
                          cycles_spheres(s, c->eye), "lights", cycles_lights(s), "environment",
                          environment);
         if (c->filter.radius > 0)
-            json_object_set_new(root, "filter_width", json_real(2 * c->filter.radius));
+            json_object_set_new(root, "filter_width", json_real(4 * c->filter.sigma));
         ok = root != NULL && json_write_as(path, root, JSON_COMPACT | JSON_REAL_PRECISION(9), &why);
     }
     if (!ok && image_written)

@@ -84,7 +84,7 @@ static bool write_channel(const struct engine *en, const struct suite_scene *sui
     if (!suite_open(suite, &s, &c, e))
         return false;
     c.filter = en->filter;
-    bool ok = make_grey(&s, channel, e);
+    bool ok = features_check_textures("separate channels", &s, e) && make_grey(&s, channel, e);
     if (ok && snprintf(path, PATH_SIZE, "%s/scene_%c%s", dir, "rgb"[channel],
                        en -> format -> ending) >= PATH_SIZE)
         ok = err_set(e, "%.64s...: path too long", dir);

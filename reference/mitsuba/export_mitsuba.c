@@ -374,7 +374,7 @@ static bool check_filter(const struct pixel_filter *f, struct err *e)
 {
     char text[PIXEL_FILTER_TEXT];
     if (f->radius == 0 || f->kind == PIXEL_FILTER_TENT ||
-        (f->kind == PIXEL_FILTER_GAUSS && f->radius == 4 * f->sigma))
+        (f->kind == PIXEL_FILTER_GAUSS && fabs(f->radius - 4 * f->sigma) < 1e-6))
         return true;
     pixel_filter_print(f, text);
     return err_set(

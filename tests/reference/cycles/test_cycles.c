@@ -339,3 +339,30 @@ TEST_WITH(only_fronts_emit, probe_setup, probe_teardown)
     moments_free(&m);
     assert_true(ok);
 }
+
+/* The front alone, to x = .015, which is .1623 of a pixel right of the middle column's centre: under a Gauss of .8 pixels column x
+ * sees Phi((.1623 + 12 - x)/.8) of it, by 8 x 40 x 64 samples, whose standard error is .0035 at most. Had Blender's width
+ * another meaning, such as the whole support of 12 sigmas, column 13 would see .001 and not .148. */
+TEST_WITH(a_gauss_is_a_quarter_of_its_width, probe_setup, probe_teardown)
+{
+    struct probe *f = *state;
+    struct moments m;
+    struct err e = {""};
+    probe_size(f, 25, 40);
+    f->suite.depth = 0;
+    build_quad(&f->s, v3(-5, -5, -2), v3(5.015f, 0, 0), v3(0, 10, 0),
+               build_material(&f->s, grey(.5f), grey(1)));
+    build_camera(&f->s, v3(0, 0, 0), 60);
+    probe_finish(f);
+    probe_ok(pixel_filter_parse("gauss:0.8:4.8", &f->c.filter, &e), &e);
+    probe_run(f, 64, &m);
+    double edge = .015 * 25 / (4 * tan(M_PI / 6));
+    for (int x = 0; x < 25; x++) {
+        double sum = 0, want = 0.5 * erfc(-(edge + 12 - x) / (.8 * sqrt(2)));
+        for (int y = 0; y < 40; y++)
+            sum += m.mean[3 * (y * 25 + x)] / 40;
+        if (!(fabs(sum - want) < 0.0175))
+            fail_msg("column %d: %g, not %g", x, sum, want);
+    }
+    moments_free(&m);
+}
