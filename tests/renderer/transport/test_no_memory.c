@@ -160,6 +160,8 @@ TEST(loaded_scenes)
         snprintf(path, sizeof path, "reference/scenes/%s.dae", scenes[i]);
         try_all(scenes[i], load, path, 20);
     }
+    try_all("of others", load, "tests/fuzz/seeds/collada-parts.dae", 20);
+    try_all("of two files", load, "tests/fuzz/seeds/collada-refers.dae", 20);
 }
 
 static bool sky(const void *arg, double *digest, struct err *e)
