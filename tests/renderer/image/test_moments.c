@@ -117,6 +117,19 @@ TEST(write_and_read)
             assert_true((float)m.m3[c] == back.m3[c]);
         }
     }
+    /* Packed it is the same, and unpacked. */
+    struct moments packed;
+    MUST(moments_read_packed(path, &packed, &e));
+    assert_true(packed.n == NULL);
+    for (int pass = 0; pass < 2; pass++) {
+        for (size_t i = 0; i < 18; i++)
+            assert_true(
+                moments_mean(&packed, i) == back.mean[i] && moments_m2(&packed, i) == back.m2[i] &&
+                moments_m3(&packed, i) == back.m3[i] && moments_n(&packed, i / 3) == back.n[i / 3]);
+        MUST(moments_unpack(&packed, &e));
+        assert_true(packed.n != NULL && packed.packed.n == NULL);
+    }
+    moments_free(&packed);
     moments_free(&m);
     moments_free(&back);
     image_free(&im);

@@ -142,6 +142,52 @@ TEST(test_pyramid_brute_force)
     }
 }
 
+/* Bands have the cells of the image's own pyramid, bit for bit, up to two levels above those that only they have; and what
+ * is made of their tiles are the levels above. From the floats of a file as from doubles. */
+TEST(test_pyramid_of_bands)
+{
+    const int sizes[][3] = {{37, 100, 16}, {21, 153, 16}, {33, 71, 4}, {9, 200, 32}, {50, 90, 10}};
+    uint64_t seed = 6;
+    for (size_t s = 0; s < COUNT(sizes); s++) {
+        int w = sizes[s][0], h = sizes[s][1], tile = sizes[s][2];
+        MOMENTS a = new_moments(w, h, "sample"), file;
+        simulate(&a, LAW_EXPONENTIAL, 1, 7, false, &seed);
+        struct err e;
+        MUST(moments_write(test_path("bands.exr"), &a, NULL, 0, &e));
+        MUST(moments_read_packed(test_path("bands.exr"), &file, &e));
+        moments_free(&a);
+        MUST(moments_read(test_path("bands.exr"), &a, NULL, &e));
+        struct pyramid whole, above, p = {0};
+        MUST(pyramid_build(&a, &a, 3, tile, &whole, &e));
+        const struct pyramid levels = pyramid_levels(w, h, tile);
+        MUST(pyramid_above(&levels, &above, &e));
+        int band = pyramid_band(&levels), bands = h / band;
+        assert_int_equal(bands > 1, s < 4);
+        for (int k = 0; k < bands; k++) {
+            struct moments part =
+                moments_rows(&file, k * band, k + 1 < bands ? band : h - k * band);
+            MUST(pyramid_rebuild(&part, &part, 3, tile, &p, &e));
+            for (int l = 0; l < whole.num_levels && (bands == 1 || l < p.tile_level + 2); l++) {
+                const struct pyramid_level *level = &p.level[l];
+                size_t num = (size_t)level->nx * (size_t)level->ny,
+                       first = (size_t)(k * band / level->side) * (size_t)level->nx;
+                assert_memory_equal(level->cell, whole.level[l].cell + first,
+                                    num * sizeof *level->cell);
+                if (l == p.tile_level)
+                    memcpy(above.level[0].cell + first, level->cell, num * sizeof *level->cell);
+            }
+        }
+        pyramid_sum_up(&above);
+        for (int l = 0; l < above.num_levels; l++)
+            assert_memory_equal(above.level[l].cell, whole.level[whole.tile_level + l].cell,
+                                (size_t)above.level[l].nx * (size_t)above.level[l].ny *
+                                    sizeof *p.cells);
+        pyramid_free(&p);
+        pyramid_free(&above);
+        pyramid_free(&whole);
+    }
+}
+
 /* Tiles of 16 at every size, counted by hand: the remainder is a tile of its own from 8 pixels on. Where
  * an image is compared, tiles of no less than half the pixels pass (1e-3: 3.1 sqrt(2 v/128) = 0.025 of
  * 0.04), which a strip of 1 x 16 could not (0.07). Half the light gone in what is left at the border is found there. */
