@@ -7,7 +7,6 @@
 #include "truth_mirrors_and_glass.h"
 #include "truth_sky.h"
 #include "truth_sun.h"
-#include "truth_texture.h"
 #include "truth_snell_window.h"
 
 #include <math.h>

@@ -6,7 +6,7 @@
  * furnace   emission [W sr^-1 m^-2], albedo
  *
  * The other kinds are listed in truth_one_lamp.h, truth_several_lamps.h, truth_sun.h, truth_lens.h,
- * truth_mirrors_and_glass.h, truth_snell_window.h, truth_ggx.h, truth_sky.h and truth_texture.h. */
+ * truth_mirrors_and_glass.h, truth_snell_window.h, truth_ggx.h and truth_sky.h, those of truth_texture.c below. */
 #ifndef ASSAY_TRUTH_H
 #define ASSAY_TRUTH_H
 
@@ -44,5 +44,20 @@ bool truth_check_triple(const char *name, const double v[3], double hi, struct e
 /* Fails unless paths of one bounce, direct light, are counted. */
 bool truth_check_depth(const struct suite_scene *scene, struct err *e)
     __attribute__((warn_unused_result));
+
+/* Pictures that face the camera, each with a texture (truth_texture.c).
+ *
+ * kind       "values" in the .json (all keys needed, no others)
+ * pictures   width (texels of a row), rows [by rows from the top: R, G, B of each texel, bytes of sRGB], boards: list of
+ *            place [left, top, right, bottom: shares of the image], uv [u, v at the left top; u, v at the right bottom],
+ *            wrap [of u, of v: WRAP, MIRROR, CLAMP or BORDER], nearest [true or false], factor [R, G, B]
+ *
+ * A plane parallel to the image's maps to it without distortion, so a pixel is the mean of the endless texture over a rectangle: for
+ * each texel the integral of its box or hat function along u times the one along v. The radiance is `factor` times that. Boards do
+ * not overlap. */
+extern const struct truth_kind truth_texture[]; /* ends with a NULL name */
+/* Integral from minus infinity to t of a texel's share at distance t from its centre, in texels: a box of width 1 (nearest), or a hat of
+ * width 2. */
+double truth_texel_share(double t, bool nearest);
 
 #endif

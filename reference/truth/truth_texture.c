@@ -1,4 +1,4 @@
-#include "truth_texture.h"
+#include "truth.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,5 +1,5 @@
 /* The closed form of 29_textures by another route: the endless texture at many places of a pixel, as the definition has it. */
-#include "reference/truth/truth_texture.h"
+#include "reference/truth/truth.h"
 #include "tests/support/quadrature.h"
 #include "tests/support/suite_files.h"
 #include "tests/support/test.h"
