@@ -97,13 +97,15 @@ double texture_mean_luminance(const struct texture *t, const struct uv c[3], rgb
     double sum = 0;
     /* Rows of triangles that stand, and between them of triangles that hang. */
     for (int i = 0; i < n; i++)
-        for (int j = 0; i + j < n; j++)
-            for (int part = 1; part <= (i + j + 1 < n ? 2 : 1); part++) {
+        for (int j = 0; i + j < n; j++) {
+            const int parts = i + j + 1 < n ? 2 : 1;
+            for (int part = 1; part <= parts; part++) {
                 const float off = (float)part / 3;
                 rgb c1 = texture_on_triangle(t, c, ((float)i + off) / (float)n,
                                              ((float)j + off) / (float)n);
                 sum += (double)rgb_luminance(rgb_mul(factor, c1));
             }
+        }
     return sum / (n * n);
 }
 
