@@ -61,6 +61,7 @@ parts=tests/fuzz/seeds/collada-parts.dae
 expect "cameras of a scene" 0 "eye: orthographic, 12 x 0" "$san_pathtracer" --list-cameras $parts
 expect "the first of several" 0 "first of 2 cameras, 'eye'" "$san_pathtracer" -r 8 8 -s 1 -f "$tmp/x.exr" $parts
 expect "another camera" 0 "" "$san_pathtracer" $small -c other -f "$tmp/x.exr" $parts
+rm -f "$tmp/x.exr"
 expect "a lens without perspective" 3 "a lens needs a perspective camera" \
     "$san_pathtracer" $small -b 0.1 -f "$tmp/x.exr" $parts
 expect "unwritable output" 3 "/nonexistent/x.exr" \

@@ -51,7 +51,7 @@ at=$(grep -abo dataWindow "$tmp/big.exr" | head -n 1 | cut -d : -f 1)
 # Behind the name, its type, its size and the lower corner: 999999 999999.
 printf '\x3f\x42\x0f\x00\x3f\x42\x0f\x00' | dd of="$tmp/big.exr" bs=1 seek=$((at + 29)) conv=notrunc status=none
 for kind in pfm hdr png; do
-    refused "$kind of 10^6 x 10^6" "1000000 x 1000000" "$assay" compare --curve srgb "$tmp/big.$kind" "$tmp/big.$kind"
+    refused "$kind of 10^6 x 10^6" "1000000 *x *1000000" "$assay" compare --curve srgb "$tmp/big.$kind" "$tmp/big.$kind"
 done
 refused "exr of 10^6 x 10^6" "big.exr: cannot read" "$assay" compare "$tmp/big.exr" "$tmp/big.exr"
 refused "a share of 10^6 x 10^6" "Invalid width (1000000)" "$assay" merge "$tmp/out.exr" "$tmp/big.exr" "$tmp/big.exr"

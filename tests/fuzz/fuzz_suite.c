@@ -1,8 +1,12 @@
-/* The .json of a scene of the suite, of both kinds: to be equal, and to differ (9x). */
+/* The .json of a scene of the suite, of both kinds: to be equal, and to differ (9x). And the suite.json of a user's own. */
 #include "reference/suite/suite_json.h"
+#include "reference/suite/suite_own.h"
 #include "fuzz.h"
 
 #include <jansson.h>
+
+#include <stdio.h>
+#include <stdlib.h>
 
 static void read_as(const char *name, const char *file, const uint8_t *data, size_t size)
 {
@@ -15,9 +19,26 @@ static void read_as(const char *name, const char *file, const uint8_t *data, siz
     json_decref(s.json);
 }
 
+/* In the directory that run.sh gives. */
+static void read_own(const uint8_t *data, size_t size)
+{
+    const char *dir = getenv("FUZZ_DIR");
+    char file[4096];
+    struct suite out = {0};
+    struct err e = {""};
+    fuzz_require(dir != NULL, "FUZZ_DIR is not set");
+    snprintf(file, sizeof file, "%s/suite.json", dir);
+    FILE *f = fopen(file, "wb");
+    fuzz_require(f != NULL && fwrite(data, 1, size, f) == size && fclose(f) == 0, "no suite.json");
+    if (!suite_own_read(dir, &out, &e))
+        fuzz_check_line(&e, file);
+    suite_free(&out);
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     read_as("10_fuzz", "10_fuzz.json", data, size);
     read_as("90_fuzz", "90_fuzz.json", data, size);
+    read_own(data, size);
     return 0;
 }

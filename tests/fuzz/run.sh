@@ -17,7 +17,7 @@ shift 2
 seeds() {
     case $1 in
     collada) ls -S reference/scenes/*.dae | tail -n 30 && ls tests/fuzz/seeds/collada* ;;
-    suite) ls reference/scenes/*.json ;;
+    suite) ls reference/scenes/*.json reference/starter/suite.json ;;
     *) ls tests/fuzz/seeds/"$1"* ;;
     esac
 }
@@ -28,7 +28,7 @@ fixed_executions() {
     picture) echo 4000 ;;
     plan) echo 10000 ;;
     rubric) echo 30000 ;;
-    results) echo 50000 ;;
+    results | suite) echo 50000 ;;
     moments) echo 200000 ;;
     *) echo 250000 ;;
     esac
@@ -42,7 +42,8 @@ fuzz_one() {
     else
         corpus=$dir/$name.corpus options=(-max_total_time="$seconds")
     fi
-    mkdir -p "$corpus" "$dir/$name.seeds"
+    mkdir -p "$corpus" "$dir/$name.seeds" "$dir/$name.files"
+    export FUZZ_DIR=$dir/$name.files # for what reads more than one file
     seeds "$name" | xargs cp -t "$dir/$name.seeds" || return 1
     places=("$corpus" "$dir/$name.seeds")
     [ -d "tests/fuzz/found/$name" ] && places+=("tests/fuzz/found/$name")

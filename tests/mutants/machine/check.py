@@ -109,7 +109,7 @@ def check_runner(build):
     for what, m, kind, unit, validate in (
             ("what compiles to the same is equivalent", planted(camera, "c->eye = f->eye;", "c->eye = (f->eye);"), "equivalent", "", ""),
             ("a wrong limit is found by a unit test", planted(camera, "x[28] >= 1e-6", "x[28] >= -1"), "mutant", "test_camera", "-"),
-            ("an eye in the wrong place is found by validate", planted(camera, "c->eye = f->eye;", "c->eye = v3(9, 9, 9);"), "mutant", "-", "DIFFERENT"),
+            ("an eye in the wrong place is found by validate", planted(camera, "c->eye = f->eye;", "c->eye = v3(9, 9, 9);"), "mutant", "test_camera", "DIFFERENT"),
             ("a camera that never ends is found", planted(camera, "c->eye = f->eye;", "for (;;);"), "mutant", "test_camera", "DIED"),
             ("what neither looks at survives", planted(tone, "12.92", "13.92"), "mutant", "-", "-"),
             ("what is no C is no mutant", planted(tone, "12.92", "12.92)"), "stillborn", "", "")):

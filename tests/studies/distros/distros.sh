@@ -45,8 +45,8 @@ for suite in $suites; do
     root=$work/$suite
     [ -d "$root/assay" ] || mmdebstrap --variant=minbase --include=make,git,ca-certificates "$suite" "$root" http://deb.debian.org/debian >"$work/$suite.root.log" 2>&1 ||
         { echo "distros.sh: $suite: $(tail -n 1 "$work/$suite.root.log")" >&2 && exit 3; }
-    mkdir -p "$root/assay"
-    git archive HEAD | tar -xm -C "$root/assay"
+    git init -q "$root/assay" && git -C "$root/assay" fetch -q --depth 1 "file://$(git rev-parse --show-toplevel)" HEAD &&
+        git -C "$root/assay" checkout -qf FETCH_HEAD || exit 3
     inside "$root" "apt-get -qq update" >>"$work/$suite.root.log" 2>&1
     for step in "$@"; do
         start=$(date +%s)
