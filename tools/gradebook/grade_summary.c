@@ -109,9 +109,8 @@ void grade_summary_build_log(FILE *f, const char *dir, const json_t *grade)
     FILE *log = name[0] != '\0' ? fopen(path.s, "rb") : NULL;
     if (log == NULL)
         return;
-    if (fseek(log, -SHOWN, SEEK_END) != 0)
-        rewind(log);
-    text[fread(text, 1, SHOWN, log)] = '\0';
+    bool ok = fseek(log, -SHOWN, SEEK_END) == 0 || fseek(log, 0, SEEK_SET) == 0;
+    text[ok ? fread(text, 1, SHOWN, log) : 0] = '\0';
     fclose(log);
     fprintf(f, "<details%s><summary>What building it said</summary><pre>",
             strcmp(member_or_empty(grade, "state"), "not_built") == 0 ? " open" : "");
