@@ -59,8 +59,7 @@ static json_t *camera_json(const struct scene *s, const struct camera *c, struct
 static bool check_filter(const struct pixel_filter *f, struct err *e)
 {
     char text[PIXEL_FILTER_TEXT];
-    if (f->radius == 0 ||
-        (f->kind == PIXEL_FILTER_GAUSS && fabs(f->radius - 6 * f->sigma) < 1e-6 && f->sigma <= 2.5))
+    if (f->radius == 0 || (pixel_filter_is_gauss(f, 6) && f->sigma <= 2.5))
         return true;
     pixel_filter_print(f, text);
     return err_set(

@@ -213,21 +213,11 @@ static bool fold_runs(struct engine_job *j, struct moments *m, struct err *e)
     return ok;
 }
 
-static void scale_moments(struct moments *m, double scale)
+/* Factors of means, of variances and of third cumulants. */
+static void multiply(struct moments *m, double first, double second, double third)
 {
     for (size_t i = 0; i < 3 * (size_t)m->width * (size_t)m->height; i++) {
-        m->mean[i] *= scale;
-        m->m2[i] *= scale * scale;
-        m->m3[i] *= scale * scale * scale;
-    }
-}
-
-/* A sum over pixels that share samples varies more than the sum of their variances: they count as noisier. */
-static void count_sharing(const struct engine *en, struct moments *m)
-{
-    const double second = pixel_filter_sharing(&en->filter, 2),
-                 third = pixel_filter_sharing(&en->filter, 3);
-    for (size_t i = 0; i < 3 * (size_t)m->width * (size_t)m->height; i++) {
+        m->mean[i] *= first;
         m->m2[i] *= second;
         m->m3[i] *= third;
     }
@@ -246,14 +236,17 @@ static bool run_all(struct engine_job *j, struct moments *out, struct err *e)
             ok = err_set(e, "%s: %d x %d pixels, not %d x %d", path, m.width, m.height,
                          j->suite->width, j->suite->height);
         if (m.mean != NULL)
-            scale_moments(&m, j->en->scale);
+            multiply(&m, j->en->scale, j->en->scale * j->en->scale,
+                     j->en->scale * j->en->scale * j->en->scale);
     } else {
         ok = moments_alloc(&m, j->suite->width, j->suite->height, e);
         strcpy(m.unit, "replicate");
         m.spp = j->spp;
         ok = ok && fold_runs(j, &m, e);
+        /* A sum over pixels that share samples varies more than the sum of their variances: they count as noisier. */
         if (ok && j->en->shares_samples && strcmp(m.unit, "replicate") == 0)
-            count_sharing(j->en, &m);
+            multiply(&m, 1, pixel_filter_sharing(&j->en->filter, 2),
+                     pixel_filter_sharing(&j->en->filter, 3));
     }
     if (ok)
         *out = m;

@@ -36,7 +36,6 @@ static bool write_image(const struct writer *w, const char *ending, const struct
 
 static const char *const RGB_NAMES[3] = {"R", "G", "B"};
 
-/* The camera looks along +Z with +X to the left. */
 /* As check_filter() has let through. */
 static void put_filter(struct writer *w, const struct pixel_filter *f)
 {
@@ -49,6 +48,7 @@ static void put_filter(struct writer *w, const struct pixel_filter *f)
     mitsuba_end(w->xml);
 }
 
+/* The camera looks along +Z with +X to the left. */
 static void put_camera(struct writer *w)
 {
     const struct camera *c = w->c;
@@ -373,8 +373,7 @@ static bool put_scene(struct writer *w, int depth, struct err *e)
 static bool check_filter(const struct pixel_filter *f, struct err *e)
 {
     char text[PIXEL_FILTER_TEXT];
-    if (f->radius == 0 || f->kind == PIXEL_FILTER_TENT ||
-        (f->kind == PIXEL_FILTER_GAUSS && fabs(f->radius - 4 * f->sigma) < 1e-6))
+    if (f->radius == 0 || f->kind == PIXEL_FILTER_TENT || pixel_filter_is_gauss(f, 4))
         return true;
     pixel_filter_print(f, text);
     return err_set(

@@ -2,8 +2,20 @@
 
 #include "renderer/base/sha256.h"
 
+#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
+
+/* What settings say only where it is not as ever, so that renders of before have the same text. */
+__attribute__((format(printf, 2, 3))) static void add_setting(struct render_id *id,
+                                                              const char *format, ...)
+{
+    size_t n = strlen(id->settings);
+    va_list args;
+    va_start(args, format);
+    vsnprintf(id->settings + n, sizeof id->settings - n, format, args);
+    va_end(args);
+}
 
 /* Of all files that textures are from and of all that the scene refers to; "" if there are none. */
 static bool hash_files(const struct scene *s, char hex[65], struct err *e)
@@ -43,20 +55,14 @@ bool render_id_make(const struct options *o, const struct scene *s, struct rende
              o->first_bounce, o->light_samples, (int)o->roulette, o->survival,
              bvh_kind_names[o->accel], o->dialect, o->lens_radius, o->focal_distance, camera,
              environment, o->fresnel, sampler_kind_names[o->sampler]);
-    if (o->starter != 0 || o->frame != FRAME_CROP) {
-        size_t n = strlen(id->settings);
-        snprintf(id->settings + n, sizeof id->settings - n, "; starter %u; frame %d", o->starter,
-                 o->frame);
-    }
-    if (images[0] != '\0') {
-        size_t n = strlen(id->settings);
-        snprintf(id->settings + n, sizeof id->settings - n, "; images %.32s", images);
-    }
+    if (o->starter != 0 || o->frame != FRAME_CROP)
+        add_setting(id, "; starter %u; frame %d", o->starter, o->frame);
+    if (images[0] != '\0')
+        add_setting(id, "; images %.32s", images);
     if (o->filter.radius > 0) {
-        size_t n = strlen(id->settings);
         char filter[PIXEL_FILTER_TEXT];
         pixel_filter_print(&o->filter, filter);
-        snprintf(id->settings + n, sizeof id->settings - n, "; filter %s", filter);
+        add_setting(id, "; filter %s", filter);
     }
     if (o->adaptive_batch > 0)
         snprintf(id->adaptive, sizeof id->adaptive, "rule %d %.17g", o->adaptive_batch,

@@ -116,6 +116,11 @@ void pixel_filter_print(const struct pixel_filter *f, char text[PIXEL_FILTER_TEX
         snprintf(text, PIXEL_FILTER_TEXT, "%s:%.9g", pixel_filter_names[f->kind], radius);
 }
 
+bool pixel_filter_is_gauss(const struct pixel_filter *f, double sigmas)
+{
+    return f->kind == PIXEL_FILTER_GAUSS && fabs(f->radius - sigmas * f->sigma) < 1e-6;
+}
+
 double pixel_filter_value(const struct pixel_filter *f, double x)
 {
     if (f->radius > 0)

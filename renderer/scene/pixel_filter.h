@@ -31,6 +31,9 @@ bool pixel_filter_parse(const char *text, struct pixel_filter *f, struct err *e)
 /* The same text again. */
 void pixel_filter_print(const struct pixel_filter *f, char text[PIXEL_FILTER_TEXT]);
 
+/* Is it a Gauss that ends at so many sigmas, to a rounding? */
+bool pixel_filter_is_gauss(const struct pixel_filter *f, double sigmas);
+
 /* f(x), per pixel. */
 double pixel_filter_value(const struct pixel_filter *f, double x);
 /* The point, from the centre, below which the share u in [0,1) of f lies: distributed as f is, so that every sample weighs the
