@@ -291,6 +291,7 @@ bool compare_moments(const struct moments *a, const struct moments *b,
     struct cell image[NUM_CHANNELS];
     struct chi_square dense = {0};
     double squared = 0, mean = 0, directed, noise;
+    bool ok = false;
     enum error_mode_kind like;
     if (!input_checks_run(a, b, opt, &j, e))
         return false;
@@ -303,25 +304,25 @@ bool compare_moments(const struct moments *a, const struct moments *b,
     s.part = malloc(2 * (size_t)a->width * (size_t)rows * sizeof *s.part);
     if (s.tiles == NULL || s.part == NULL) {
         err_set(e, "out of memory for the regions of %d x %d pixels", a->width, a->height);
-        goto fail;
+        goto done;
     }
     if (!image_alloc(&out->z, a->width, a->height, 1, (const char *const[]){"z"}, e) ||
         !image_alloc(&out->relative, a->width, a->height, 1, (const char *const[]){"rel"}, e))
-        goto fail;
+        goto done;
     for (s.channel = 0; s.channel < NUM_CHANNELS; s.channel++) {
         pyramid_free(&s.above);
         if (!pyramid_above(&levels, &s.above, e) ||
             !sweep_channel(&j, a, b, &levels, &s, &dense, out, e))
-            goto fail;
+            goto done;
         image[s.channel] = s.above.level[s.above.num_levels - 1].cell[0];
         if (s.channel < CHANNEL_LUMINANCE)
             squared += luminance_weight[s.channel] * s.squared;
     }
     if (!test_rest(a, b, &j, &like, &directed, &noise, out, e))
-        goto fail;
+        goto done;
     fill_statistics(&j, worst, &dense, like, directed, noise, out);
     if (!fill_tiles(&j, &s.above, out, &tiles, e))
-        goto fail;
+        goto done;
     mean = image[CHANNEL_LUMINANCE].b;
     out->rms_bias = sqrt(fmax(0, squared) * whole.width * whole.height) / mean;
     for (int c = 0; c < NUM_CHANNELS; c++) {
@@ -341,21 +342,17 @@ bool compare_moments(const struct moments *a, const struct moments *b,
         out->worst.mdb = region_mdb(&j, &m, w->channel);
     }
     verdict_decide(out, opt, tiles);
-    free(tiles);
-    free(s.tiles);
-    free(s.part);
-    pyramid_free(&s.band);
-    pyramid_free(&s.above);
-    return true;
+    ok = true;
 
-fail:
+done:
     free(tiles);
     free(s.tiles);
     free(s.part);
     pyramid_free(&s.band);
     pyramid_free(&s.above);
-    comparison_free(out);
-    return false;
+    if (!ok)
+        comparison_free(out);
+    return ok;
 }
 
 void comparison_free(struct comparison *c)
