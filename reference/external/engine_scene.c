@@ -66,8 +66,10 @@ static bool make_grey(struct scene *s, int channel, struct err *e)
 {
     for (uint32_t i = 0; i < s->num_materials; i++) {
         struct material *m = &s->materials[i];
-        rgb *const colours[] = {&m->reflectance, &m->transmittance, &m->eta, &m->k, &m->radiance};
-        for (int k = 0; k < 5; k++)
+        rgb *const colours[] = {&m->reflectance, &m->transmittance, &m->specular,
+                                &m->mirror,      &m->eta,           &m->k,
+                                &m->radiance};
+        for (size_t k = 0; k < sizeof colours / sizeof *colours; k++)
             *colours[k] = in_channel(*colours[k], channel);
     }
     for (uint32_t i = 0; i < s->num_lights; i++)

@@ -15,6 +15,7 @@ const char *const feature_names[NUM_FEATURES + 1] = {
     [FEATURE_SCHLICK] = "schlick",
     [FEATURE_MICROFACET] = "microfacet",
     [FEATURE_BECKMANN] = "beckmann",
+    [FEATURE_PLASTIC] = "plastic",
     [FEATURE_AREA] = "area",
     [FEATURE_TWO_SIDED] = "two_sided",
     [FEATURE_POINT] = "point",
@@ -95,7 +96,8 @@ const char *const features_material_names[NUM_MATERIAL_KINDS] = {
     [MATERIAL_MIRROR] = "mirrors",
     [MATERIAL_REFRACTION] = "a boundary that only refracts",
     [MATERIAL_GLASS] = "glass",
-    [MATERIAL_MICROFACET] = "microfacets"};
+    [MATERIAL_MICROFACET] = "microfacets",
+    [MATERIAL_PLASTIC] = "diffuse surfaces with a highlight or a mirror image"};
 
 static unsigned material_features(const struct material *m)
 {
@@ -107,6 +109,9 @@ static unsigned material_features(const struct material *m)
     case MATERIAL_GLASS: f = 1u << (m->schlick ? FEATURE_SCHLICK : FEATURE_GLASS); break;
     case MATERIAL_MICROFACET:
         f = 1u << (m->microfacet == MICROFACET_GGX ? FEATURE_MICROFACET : FEATURE_BECKMANN);
+        break;
+    case MATERIAL_PLASTIC:
+        f = 1u << FEATURE_PLASTIC | (rgb_is_zero(m->mirror) ? 0 : 1u << FEATURE_MIRROR);
         break;
     }
     if (!rgb_is_zero(m->radiance))

@@ -13,6 +13,7 @@ enum feature {
     FEATURE_SCHLICK,     /* glass with Schlick's approximation */
     FEATURE_MICROFACET,  /* rough metal, GGX */
     FEATURE_BECKMANN,    /* rough metal, Beckmann */
+    FEATURE_PLASTIC,     /* diffuse surface with a highlight, Beckmann, one colour at all angles */
     FEATURE_AREA,        /* glowing triangles or spheres, on the front side alone */
     FEATURE_TWO_SIDED,   /* glowing on both sides */
     FEATURE_POINT,       /* point light, inverse square */

@@ -305,6 +305,7 @@ static void write_notes(struct loader *ld)
         "%u groups of lines are left out",
         "%u surfaces are wholly transparent, so left out",
         "%u surfaces without material are grey (0.8)",
+        "%u materials, which reflect more than all light together, are darkened",
         "%u lights of Blender have no radius here: set theirs to 0, or give an area light",
         "%u spots of Blender have a sharp edge here: set their blend to 0",
         "%u upright cameras of Blender: right if its sensor fit is horizontal"};

@@ -16,7 +16,6 @@ struct material_tag {
 /* The assignment's emitter shines to both sides and reflects nothing. */
 static bool read_cgl_emission(struct loader *ld, const xmlNode *tag, struct material *m)
 {
-    m->reflectance = grey(0);
     m->radiance_both_sides = true;
     return field_read_all(ld, tag, FIELDS({FIELD_OF_COLOR("radiance", &m->radiance, 0)}));
 }
@@ -44,7 +43,6 @@ static bool read_refraction(struct loader *ld, const xmlNode *tag, struct materi
 {
     double roughness;
     m->kind = MATERIAL_REFRACTION;
-    m->reflectance = grey(0);
     return field_read_all(ld, tag,
                           FIELDS({FIELD_OF_COLOR("transmittance", &m->transmittance, 1)}, {IOR},
                                  {"roughness", FIELD_NUMBER, &roughness, .lo = 0, .hi = 0}));
@@ -66,7 +64,6 @@ static bool read_cgl_microfacet(struct loader *ld, const xmlNode *tag, struct ma
     m->kind = MATERIAL_MICROFACET;
     m->microfacet = MICROFACET_BECKMANN;
     m->conductor = true;
-    m->reflectance = grey(0);
     return field_read_all(ld, tag,
                           FIELDS({ALPHA}, {FIELD_OF_COLOR("eta", &m->eta, 1000)},
                                  {FIELD_OF_COLOR("k", &m->k, 1000)}));
@@ -80,7 +77,6 @@ static bool read_assay_microfacet(struct loader *ld, const xmlNode *tag, struct 
                        shadowing = {"shadowing", FIELD_CHOICE, &m->separable,
                                     .words = {"correlated", "separable"}};
     m->kind = MATERIAL_MICROFACET;
-    m->reflectance = grey(0);
     m->conductor = element_child_named(tag, "reflectance") == NULL;
     bool ok = m->conductor
                   ? field_read_all(ld, tag,
@@ -94,6 +90,7 @@ static bool read_assay_microfacet(struct loader *ld, const xmlNode *tag, struct 
     return ok;
 }
 
+/* All but the first take the place of what profile_COMMON reflects. */
 static const struct material_tag TAGS[] = {
     {"ASSAY", "emission", read_assay_emission},
     {"ASSAY", "mirror", read_mirror},
@@ -114,7 +111,14 @@ bool extra_read_material(struct loader *ld, const xmlNode *technique, struct mat
     if (!element_technique_content(ld, technique, &tag))
         return false;
     for (size_t i = 0; i < sizeof TAGS / sizeof *TAGS; i++)
-        if (strcmp(TAGS[i].profile, profile) == 0 && element_is(tag, TAGS[i].name))
+        if (strcmp(TAGS[i].profile, profile) == 0 && element_is(tag, TAGS[i].name)) {
+            if (i > 0) {
+                m->kind = MATERIAL_DIFFUSE;
+                m->reflectance = m->specular = m->mirror = grey(0);
+                m->reflectance_map = 0;
+                m->separable = false;
+            }
             return TAGS[i].read(ld, tag, m);
+        }
     return fail_at(ld, tag, "unknown material tag '%.60s'", (const char *)tag->name);
 }

@@ -90,23 +90,51 @@ static bool read_opacity(struct loader *ld, const xmlNode *shader)
                    "transparency is not supported (--dialect cgl ignores it)");
 }
 
-/* What reflects in other ways than diffusely must be black. */
-static bool check_only_diffuse(struct loader *ld, const xmlNode *shader)
+/* No channel of the three together is to be above 1. */
+static void darken(struct loader *ld, struct material *m)
 {
-    rgb specular = grey(0), reflective = grey(0);
-    double reflectivity = 1;
-    if (!read_opacity(ld, shader) || ld->is_transparent)
-        return ld->is_transparent;
-    if (!read_channel(ld, shader, "specular", &specular, NULL) ||
+    rgb *const part[] = {&m->reflectance, &m->specular, &m->mirror};
+    const rgb texel = m->reflectance_map != 0
+                          ? texture_max(&ld->scene.textures[m->reflectance_map - 1])
+                          : grey(1);
+    const float most =
+        rgb_max(rgb_add(rgb_mul(m->reflectance, texel), rgb_add(m->specular, m->mirror)));
+    if (!(most > 1))
+        return;
+    for (int i = 0; i < 3; i++)
+        *part[i] = (rgb){part[i]->r / most, part[i]->g / most, part[i]->b / most};
+    ld->num_left_out[LEFT_OUT_BRIGHT]++;
+}
+
+/* The highlight of Blinn's (n.h)^shininess is as wide as Beckmann's of alpha^2 = 2/(shininess + 2) [Walter07, after
+ * eq. 31], that of Phong's (r.v)^shininess as Blinn's of four times the exponent: r turns twice as fast as h. */
+static bool read_highlight(struct loader *ld, const xmlNode *shader, struct material *m)
+{
+    rgb reflective = grey(0);
+    double reflectivity = 1, shininess = 0;
+    if (!read_channel(ld, shader, "specular", &m->specular, NULL) ||
+        !read_factor(ld, shader, "shininess", &shininess) ||
         !read_channel(ld, shader, "reflective", &reflective, NULL) ||
         !read_factor(ld, shader, "reflectivity", &reflectivity))
         return false;
-    if (!rgb_is_zero(specular))
+    m->mirror = rgb_scale(reflective, (float)fmax(0, reflectivity));
+    const bool shines = !rgb_is_zero(m->specular), mirrors = !rgb_is_zero(m->mirror);
+    if (shines && element_is(shader, "lambert"))
         return fail_at(ld, element_child_named(shader, "specular"),
-                       "specular reflection is not supported (--dialect cgl ignores it)");
-    if (!rgb_is_zero(reflective) && reflectivity != 0)
-        return fail_at(ld, element_child_named(shader, "reflective"),
-                       "mirror reflection is not supported (--dialect cgl ignores it)");
+                       "a <lambert> that is <specular>");
+    if (!shines && !mirrors)
+        return true;
+    const double n = fmax(0, shininess) * (element_is(shader, "phong") ? 4 : 1);
+    m->alpha = fmaxf(MICROFACET_MIN_ALPHA, (float)sqrt(2 / (n + 2)));
+    m->microfacet = MICROFACET_BECKMANN;
+    m->separable = true;
+    m->kind = MATERIAL_PLASTIC;
+    darken(ld, m);
+    if (!rgb_is_zero(m->reflectance) || (shines && mirrors))
+        return true;
+    m->kind = shines ? MATERIAL_MICROFACET : MATERIAL_MIRROR;
+    m->reflectance = shines ? m->specular : m->mirror;
+    m->specular = m->mirror = grey(0);
     return true;
 }
 
@@ -138,7 +166,7 @@ static bool read_shader(struct loader *ld, const xmlNode *shader, struct materia
     if (rgb_max(m->reflectance) > 1)
         return fail_at(ld, element_child_named(shader, "diffuse"), "diffuse reflectance above 1");
     if (ld->dialect == DIALECT_COLLADA)
-        return check_only_diffuse(ld, shader);
+        return read_opacity(ld, shader) && (ld->is_transparent || read_highlight(ld, shader, m));
     if (!rgb_is_zero(m->radiance))
         return fail_at(ld, element_child_named(shader, "emission"),
                        "the assignment has no emission in profile_COMMON: use a technique of "
@@ -191,11 +219,7 @@ static bool read_effect(struct loader *ld, const xmlNode *effect, struct materia
         return fail_at(ld, technique, "a technique of ours for a surface that is transparent");
     if (technique == NULL)
         return true;
-    if (!extra_read_material(ld, technique, m))
-        return false;
-    if (m->kind != MATERIAL_DIFFUSE) /* which has taken the place of what had a texture */
-        m->reflectance_map = 0;
-    return true;
+    return extra_read_material(ld, technique, m);
 }
 
 static bool read_material(struct loader *ld, const xmlNode *material, struct material *m)

@@ -76,7 +76,7 @@ static bool check_maps(const struct scene *s, const struct material *m, const ch
                        struct err *e)
 {
     if (m->reflectance_map > s->num_textures || m->radiance_map > s->num_textures ||
-        (m->reflectance_map != 0 && m->kind != MATERIAL_DIFFUSE) || s->uv == NULL)
+        (m->reflectance_map != 0 && !(1 << m->kind & MATERIAL_IS_MATT)) || s->uv == NULL)
         return err_set(e, "%s: material '%s': a texture that is not there, or not diffuse", where,
                        m->name);
     rgb reflectance = largest(s, m->reflectance, m->reflectance_map);
@@ -94,6 +94,10 @@ static bool check_materials(const struct scene *s, const char *where, struct err
         const struct material *m = &s->materials[i];
         if (!is_radiometric(m->reflectance) || rgb_max(m->reflectance) > 1)
             return err_set(e, "%s: material '%s': reflectance outside [0,1]", where, m->name);
+        if (!is_radiometric(m->specular) || rgb_max(m->specular) > 1 ||
+            !is_radiometric(m->mirror) || rgb_max(m->mirror) > 1)
+            return err_set(e, "%s: material '%s': highlight or mirror image outside [0,1]", where,
+                           m->name);
         if (!is_radiometric(m->transmittance) || rgb_max(m->transmittance) > 1)
             return err_set(e, "%s: material '%s': transmittance outside [0,1]", where, m->name);
         if (!material_numbers_are_valid(m))
@@ -360,5 +364,6 @@ bool scene_read_environment(struct scene *s, const char *path, struct err *e)
 
 bool material_is_black(const struct material *m)
 {
-    return !m->conductor && rgb_is_zero(m->reflectance) && rgb_is_zero(m->transmittance);
+    return !m->conductor && rgb_is_zero(m->reflectance) && rgb_is_zero(m->transmittance) &&
+           rgb_is_zero(m->specular) && rgb_is_zero(m->mirror);
 }

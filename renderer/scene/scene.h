@@ -32,14 +32,17 @@ enum material_kind {
     MATERIAL_MIRROR,
     MATERIAL_REFRACTION, /* only the refracted ray; nothing under total reflection */
     MATERIAL_GLASS,      /* smooth dielectric: reflects by Fresnel's equations, refracts the rest */
-    MATERIAL_MICROFACET  /* rough conductor */
+    MATERIAL_MICROFACET, /* rough conductor */
+    MATERIAL_PLASTIC /* diffuse under a highlight, a rough lobe of one colour at all angles, and a mirror image: their
+                            sum, either may be black */
 };
 /* Sets of kinds, of bits 1 << kind: what a kind needs and does, for all who need not know its name. */
 enum {
-    NUM_MATERIAL_KINDS = MATERIAL_MICROFACET + 1,
-    MATERIAL_REFRACTS = 1 << MATERIAL_REFRACTION | 1 << MATERIAL_GLASS, /* by ior */
-    MATERIAL_IS_ROUGH = 1 << MATERIAL_MICROFACET,                       /* by alpha */
-    MATERIAL_SCATTERS = 1 << MATERIAL_DIFFUSE | MATERIAL_IS_ROUGH       /* no delta lobe */
+    NUM_MATERIAL_KINDS = MATERIAL_PLASTIC + 1,
+    MATERIAL_REFRACTS = 1 << MATERIAL_REFRACTION | 1 << MATERIAL_GLASS,   /* by ior */
+    MATERIAL_IS_ROUGH = 1 << MATERIAL_MICROFACET | 1 << MATERIAL_PLASTIC, /* by alpha */
+    MATERIAL_IS_MATT = 1 << MATERIAL_DIFFUSE | 1 << MATERIAL_PLASTIC,     /* may have a texture */
+    MATERIAL_SCATTERS = MATERIAL_IS_MATT | MATERIAL_IS_ROUGH /* light sampling finds a lobe */
 };
 
 enum microfacet_kind {
@@ -57,17 +60,19 @@ enum microfacet_kind {
 struct material {
     char name[64];
     enum material_kind kind;
-    rgb reflectance;   /* diffuse: albedo in [0,1]; mirror, glass: factor of the mirror ray */
+    rgb reflectance; /* diffuse, plastic: albedo in [0,1]; mirror, glass: factor of the mirror ray */
+    rgb specular; /* plastic: what its facets reflect at any angle, f = specular D G2 / (4 cos cos) */
+    rgb mirror;   /* plastic: factor of the mirror ray */
     rgb transmittance; /* refraction, glass: factor of the refracted ray */
     float ior;         /* refraction, glass: of the side that the normal points away from,
                                  relative to the side it points to; above 1 for glass in air */
     bool schlick;      /* glass: Schlick's approximation, as the assignment has it */
     enum microfacet_kind microfacet;
-    float alpha;              /* microfacet: roughness, root mean square slope times sqrt(2) */
-    bool separable;           /* microfacet: shadowing and masking independent */
-    bool conductor;           /* microfacet: Fresnel by eta and k; else reflectance, at any angle */
-    rgb eta, k;               /* microfacet: complex index of refraction against air */
-    rgb radiance;             /* emitted radiance; zero for most */
+    float alpha;    /* microfacet, plastic: roughness, root mean square slope times sqrt(2) */
+    bool separable; /* microfacet, plastic: shadowing and masking independent */
+    bool conductor; /* microfacet: Fresnel by eta and k; else reflectance, at any angle */
+    rgb eta, k;     /* microfacet: complex index of refraction against air */
+    rgb radiance;   /* emitted radiance; zero for most */
     bool radiance_both_sides; /* else only from the side the geometric normal points to */
     uint32_t reflectance_map, radiance_map;
 };

@@ -17,7 +17,8 @@ rgb bsdf_eval(const struct material *m, vec3 wo, vec3 wi)
     float pdf_w;
     if (m->kind == MATERIAL_DIFFUSE)
         return wo.z > 0 && wi.z > 0 ? eval_diffuse(m->reflectance) : grey(0);
-    return bsdf_is_delta(m) ? grey(0) : eval_lobes(&v, -1, wo, wi, &pdf_w);
+    return bsdf_is_delta(m) ? grey(0)
+                            : eval_lobes(&v, -1, eval_diffuse(m->reflectance), wo, wi, &pdf_w);
 }
 
 float bsdf_pdf_w(const struct material *m, vec3 wo, vec3 wi)
@@ -27,7 +28,7 @@ float bsdf_pdf_w(const struct material *m, vec3 wo, vec3 wi)
     if (m->kind == MATERIAL_DIFFUSE)
         return wo.z > 0 && wi.z > 0 ? warp_cosine_hemisphere_pdf_w(wi.z) : 0;
     if (!bsdf_is_delta(m))
-        eval_lobes(&v, -1, wo, wi, &pdf_w);
+        eval_lobes(&v, -1, grey(0), wo, wi, &pdf_w);
     return pdf_w;
 }
 

@@ -14,7 +14,7 @@
 /* Materials of lanes. */
 struct materialv {
     vi bits, facets;
-    rgbv reflectance, transmittance, eta, k;
+    rgbv reflectance, transmittance, eta, k; /* plastic: reflectance is that of its facets */
     vf ior, alpha;
 };
 
@@ -37,6 +37,7 @@ INLINE void materials_gather(const float *record, const int32_t number[LANES], s
     m->eta = (rgbv){w[1][1], w[1][2], w[1][3]};
     m->k = (rgbv){w[1][4], w[1][5], w[1][6]};
     m->facets = as_vi(w[1][MATERIAL_FACETS - COLUMNS]);
+    m->reflectance = rgb_select(has_bits(m->bits, 1 << MATERIAL_PLASTIC), m->eta, m->reflectance);
 }
 
 /* struct bsdf_sample */
@@ -141,10 +142,39 @@ INLINE rgbv eval_diffuse(rgbv reflectance)
     return rgb_scalev(reflectance, vf_set(INV_PI_F));
 }
 
-/* f of the lanes that scatter other than evenly, and the density of wi. */
-INLINE rgbv eval_lobes(const struct materialv *m, vi lanes, vec3v wo, vec3v wi, vf *pdf_w)
+/* f of the lanes that scatter other than evenly alone, and the density of wi. diffuse: f of the part that does. */
+INLINE rgbv eval_lobes(const struct materialv *m, vi lanes, rgbv diffuse, vec3v wo, vec3v wi,
+                       vf *pdf_w)
 {
-    return eval_microfacet(m, lanes, wo, wi, pdf_w);
+    const vf zero = vf_set(0);
+    rgbv f = eval_microfacet(m, lanes, wo, wi, pdf_w);
+    vi plastic = lanes & has_bits(m->bits, 1 << MATERIAL_PLASTIC);
+    if (!bits(plastic))
+        return f;
+    const vf mirror = m->ior, highlight = m->transmittance.r; /* shares */
+    plastic &= vf_lt(zero, wo.z) & vf_lt(zero, wi.z);
+    vf both = highlight * *pdf_w + (1 - mirror - highlight) * warp_cosine_hemisphere_pdf_w(wi.z);
+    *pdf_w = vf_select(plastic, both, *pdf_w);
+    return rgb_select(plastic, rgb_addv(f, diffuse), f);
+}
+
+/* One of its lobes is picked by its share; both that are no mirror count in the weight, whichever it was. s holds a
+ * direction of the diffuse lobe. */
+INLINE void sample_plastic(const struct materialv *m, vi lanes, rgbv reflectance, vec3v wo,
+                           const vf u[4], struct bsdf_samplev *s)
+{
+    const vf zero = vf_set(0), mirror = m->ior, highlight = m->transmittance.r;
+    vi mirrored = lanes & vf_lt(u[2], mirror);
+    vi facet = lanes & ~mirrored & vf_lt(u[2], mirror + highlight);
+    if (bits(facet))
+        sample_microfacet(m, facet, wo, u[0], u[1], s);
+    lanes &= ~mirrored & (~facet | vf_lt(zero, s->pdf_w));
+    vf pdf_w;
+    rgbv f = eval_lobes(m, lanes, eval_diffuse(reflectance), wo, s->wi, &pdf_w);
+    lanes &= vf_lt(zero, pdf_w);
+    s->weight = rgb_select(lanes, rgb_scalev(f, s->wi.z / pdf_w), s->weight);
+    s->pdf_w = vf_select(lanes, pdf_w, s->pdf_w);
+    sample_mirror(mirrored, wo, rgb_scalev(m->k, 1 / mirror), s);
 }
 
 /* Directions for the lanes of the mask; the others' are of no use. number, bits and reflectance: of their
@@ -174,6 +204,9 @@ INLINE void sample_lobes(const float *record, const int32_t number[LANES], vi ki
     vi rough = lanes & has_bits(kinds, 1 << MATERIAL_MICROFACET);
     if (bits(rough))
         sample_microfacet(&m, rough, wo, u[0], u[1], s);
+    vi plastic = lanes & has_bits(kinds, 1 << MATERIAL_PLASTIC);
+    if (bits(plastic))
+        sample_plastic(&m, plastic, reflectance, wo, u, s);
 }
 
 #endif

@@ -55,6 +55,17 @@ static void fill_sphere(const struct scene *s, uint32_t i, float *r)
     set_int(r + RECORD_LIGHT, s->sphere_light[i]);
 }
 
+/* A lobe is sampled in proportion to its largest colour: no direction has then more weight than all three together. */
+static void set_plastic(const struct material *m, float r[MATERIAL_WORDS])
+{
+    const float highlight = rgb_max(m->specular), mirror = rgb_max(m->mirror);
+    const float all = rgb_max(m->reflectance) + highlight + mirror;
+    r[MATERIAL_MIRROR_SHARE] = all > 0 ? mirror / all : 0;
+    r[MATERIAL_HIGHLIGHT_SHARE] = all > 0 ? highlight / all : 0;
+    set_rgb(r + MATERIAL_SPECULAR, m->specular);
+    set_rgb(r + MATERIAL_IMAGE, m->mirror);
+}
+
 void scene_simd_material(const struct material *m, float r[MATERIAL_WORDS])
 {
     set_rgb(r + MATERIAL_REFLECTANCE, m->reflectance);
@@ -69,6 +80,8 @@ void scene_simd_material(const struct material *m, float r[MATERIAL_WORDS])
                                    (m->conductor ? MATERIAL_IS_CONDUCTOR : 0) |
                                    (m->reflectance_map != 0 ? MATERIAL_IS_TEXTURED : 0));
     set_int(r + MATERIAL_FACETS, (int32_t)m->microfacet);
+    if (m->kind == MATERIAL_PLASTIC)
+        set_plastic(m, r);
 }
 
 struct scene_simd *scene_simd_build(const struct scene *s, struct err *e)

@@ -31,7 +31,12 @@ enum {
     MATERIAL_ETA = 9,
     MATERIAL_K = 12,
     MATERIAL_FACETS = 15, /* enum microfacet_kind, as an integer's bits */
-    MATERIAL_WORDS = 16
+    MATERIAL_WORDS = 16,
+    /* Of plastic, in the place of what it does not have; shares: of the directions that are sampled. */
+    MATERIAL_MIRROR_SHARE = MATERIAL_IOR,
+    MATERIAL_HIGHLIGHT_SHARE = MATERIAL_TRANSMITTANCE,
+    MATERIAL_SPECULAR = MATERIAL_ETA,
+    MATERIAL_IMAGE = MATERIAL_K /* colour of the mirror's */
 };
 enum {
     MATERIAL_IS_BLACK = 1 << 8,

@@ -15,6 +15,15 @@ static rgb albedo_of(const struct material *m)
     return rgb_add(rgb_scale(mirror, back), rgb_scale(m->transmittance, 1 - back));
 }
 
+static rgb albedo_at(const struct scene *s, const struct material *m, uint32_t prim, float u,
+                     float v)
+{
+    rgb albedo = albedo_of(m);
+    if (m->reflectance_map != 0)
+        albedo = rgb_mul(albedo, scene_map_at(s, m->reflectance_map, prim, u, v));
+    return rgb_add(albedo, rgb_add(m->specular, m->mirror));
+}
+
 void first_hits_record(const struct integrator *it, struct batch *b, int num_active)
 {
     const struct scene *s = it->scene;
@@ -33,10 +42,7 @@ void first_hits_record(const struct integrator *it, struct batch *b, int num_act
         b->first.object[i] = is_triangle ? s->tri_object[prim] : s->sphere_object[sphere];
         b->first.depth[i] = -dot(sub(at.p, c->eye), c->backward);
         vec3s_set(&b->first.normal, i, at.ns);
-        rgb albedo = albedo_of(&s->materials[material]);
-        uint32_t map = s->materials[material].reflectance_map;
-        if (map != 0)
-            albedo = rgb_mul(albedo, scene_map_at(s, map, prim, b->hit.u[i], b->hit.v[i]));
-        rgbs_set(&b->first.albedo, i, albedo);
+        rgbs_set(&b->first.albedo, i,
+                 albedo_at(s, &s->materials[material], prim, b->hit.u[i], b->hit.v[i]));
     }
 }

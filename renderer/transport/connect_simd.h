@@ -11,7 +11,7 @@ enum { TOGETHER = 4 };
 /* Vertices as samples of lights want them. */
 struct vertexv {
     vec3v p, ng, ns, wo, off; /* off: where rays leave on the side of ng */
-    rgbv throughput, diffuse; /* diffuse: f, if it is that */
+    rgbv throughput, diffuse; /* diffuse: f of what is that of it */
     vf eps;
     vi bits;
 };
@@ -58,7 +58,7 @@ INLINE unsigned scatter_towards(const struct integrator *it, const struct batch 
         materials_gather(it->records->material, (const int32_t *)b->material + k, &m);
         framev local = frame_from_normalv(v->ns);
         vf pdf_lobes;
-        rgbv lobes = eval_lobes(&m, lanes_of(other), frame_to_localv(&local, v->wo),
+        rgbv lobes = eval_lobes(&m, lanes_of(other), v->diffuse, frame_to_localv(&local, v->wo),
                                 frame_to_localv(&local, wi), &pdf_lobes);
         *f = rgb_select(diffuse, *f, rgb_scalev(lobes, cos_i));
         *pdf_w = vf_select(diffuse, *pdf_w, pdf_lobes);

@@ -142,11 +142,11 @@ static __attribute__((noinline)) void apply_textures(const struct integrator *it
     const struct scene *s = it->scene;
     for (; mask; mask &= mask - 1) {
         int i = k + __builtin_ctz(mask);
-        rgb texel = scene_map_at(s, s->materials[b->material[i]].reflectance_map, b->hit.prim[i],
-                                 b->hit.u[i], b->hit.v[i]);
+        const struct material *m = &s->materials[b->material[i]];
+        rgb texel = scene_map_at(s, m->reflectance_map, b->hit.prim[i], b->hit.u[i], b->hit.v[i]);
         rgb r = rgb_mul(rgbs_get(&b->reflectance, i), texel);
         rgbs_set(&b->reflectance, i, r);
-        if (rgb_is_zero(r))
+        if (rgb_is_zero(r) && m->kind == MATERIAL_DIFFUSE)
             b->goes_on[k / LANES] &= (uint8_t) ~(1u << (i - k));
     }
 }

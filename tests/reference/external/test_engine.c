@@ -301,36 +301,41 @@ TEST(materials_and_lights_have_features)
         {.kind = MATERIAL_REFRACTION, .ior = 1.5f},
         {.kind = MATERIAL_MICROFACET, .microfacet = MICROFACET_GGX, .alpha = .1f},
         {.kind = MATERIAL_MICROFACET, .microfacet = MICROFACET_BECKMANN, .alpha = .1f},
+        {.kind = MATERIAL_PLASTIC, .specular = {.1f, 0, 0}, .alpha = .1f},
+        {.kind = MATERIAL_PLASTIC, .specular = {.1f, 0, 0}, .mirror = {0, 0, .1f}, .alpha = .1f},
         {.radiance = {1, 1, 1}, .radiance_both_sides = true},
     };
-    const enum feature of_material[] = {FEATURE_MIRROR,     FEATURE_GLASS,      FEATURE_SCHLICK,
-                                        FEATURE_REFRACTION, FEATURE_MICROFACET, FEATURE_BECKMANN,
-                                        FEATURE_TWO_SIDED};
+    const unsigned of_material[] = {
+        1u << FEATURE_MIRROR,     1u << FEATURE_GLASS,
+        1u << FEATURE_SCHLICK,    1u << FEATURE_REFRACTION,
+        1u << FEATURE_MICROFACET, 1u << FEATURE_BECKMANN,
+        1u << FEATURE_PLASTIC,    1u << FEATURE_PLASTIC | 1u << FEATURE_MIRROR,
+        1u << FEATURE_TWO_SIDED};
     const struct light lights[] = {
         {.kind = LIGHT_SPOT, .value = {1, 1, 1}, .axis = {0, 1, 0}, .attenuation = {0, 0, 1}},
         {.kind = LIGHT_DIRECTIONAL, .value = {1, 1, 1}, .to_light = {0, 1, 0}},
     };
     const unsigned of_light[] = {1u << FEATURE_SPOT, 1u << FEATURE_DIRECTIONAL};
-    for (size_t i = 0; i < 11; i++) {
+    for (size_t i = 0; i < 13; i++) {
         struct scene s = build_scene();
         struct camera c;
         struct err e;
         unsigned want = 0;
         uint32_t m = build_material(&s, grey(0), grey(0));
-        if (i < 7) {
+        if (i < 9) {
             s.materials[m] = materials[i];
-            want = 1u << of_material[i];
+            want = of_material[i];
         }
         build_quad(&s, v3(-1, -1, -3), v3(2, 0, 0), v3(0, 2, 0), m);
-        if (i == 7 || i == 8) {
-            build_light(&s, lights[i - 7]);
-            want = of_light[i - 7];
+        if (i == 9 || i == 10) {
+            build_light(&s, lights[i - 9]);
+            want = of_light[i - 9];
         }
-        if (i == 9) { /* tilted by 0.01, a little over half a degree */
+        if (i == 11) { /* tilted by 0.01, a little over half a degree */
             s.normal[0] = normalize(v3(0.01f, 0, 1));
             want = 1u << FEATURE_SMOOTH;
         }
-        if (i == 10) {
+        if (i == 12) {
             const rgb texel = {0.1f, 0.2f, 0.3f};
             s.materials[m].reflectance = grey(1);
             s.materials[m].reflectance_map = build_texture(&s, 1, 1, &texel, true, TEXTURE_CLAMP);
@@ -340,8 +345,8 @@ TEST(materials_and_lights_have_features)
         if (!scene_finish(&s, "test", &e) || !camera_init(&c, &s, 8, 8, &e))
             fail_msg("%s", e.msg);
         assert_int_equal(features_of_scene(&s, &c), want);
-        assert_int_equal(features_check_textures("x", &s, &e), i != 10);
-        assert_true(i != 10 ||
+        assert_int_equal(features_check_textures("x", &s, &e), i != 12);
+        assert_true(i != 12 ||
                     strcmp(e.msg, "x: the texture of material 'm' cannot be expressed") == 0);
         scene_free(&s);
     }

@@ -113,13 +113,15 @@ static void put_lights(FILE *f, const struct scene *s)
 
 static void put_materials(FILE *f, const struct scene *s)
 {
-    static const char *const kind[] = {"diffuse", "mirror", "refraction", "glass", "microfacet"};
+    static const char *const kind[] = {"diffuse", "mirror",     "refraction",
+                                       "glass",   "microfacet", "plastic"};
     for (uint32_t i = 0; i < s->num_materials; i++) {
         const struct material *m = &s->materials[i];
-        char key[5][32];
-        for (int k = 0; k < 5; k++)
+        char key[7][32];
+        for (int k = 0; k < 7; k++)
             snprintf(key[k], sizeof *key, "m%u.%s", i,
-                     (const char *[]){"reflectance", "transmittance", "radiance", "eta", "k"}[k]);
+                     (const char *[]){"reflectance", "transmittance", "radiance", "eta", "k",
+                                      "specular", "mirror"}[k]);
         fprintf(
             f,
             "m%u.name %s\nm%u.kind %s\nm%u.both_sides %d\nm%u.ior %.9g\nm%u.schlick %d\nm%u.alpha %.9g\n",
@@ -133,6 +135,8 @@ static void put_materials(FILE *f, const struct scene *s)
         put_rgb(f, key[2], m->radiance);
         put_rgb(f, key[3], m->eta);
         put_rgb(f, key[4], m->k);
+        put_rgb(f, key[5], m->specular);
+        put_rgb(f, key[6], m->mirror);
     }
 }
 
@@ -328,7 +332,7 @@ TEST(geometry)
 }
 TEST(materials)
 {
-    run_file("tests/renderer/collada/look.cases", 52);
+    run_file("tests/renderer/collada/look.cases", 52 + 12);
 }
 TEST(lights_and_cameras)
 {

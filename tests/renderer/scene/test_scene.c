@@ -287,13 +287,14 @@ TEST(bad_scenes_are_refused)
 }
 
 /* Every number of a scene at and beyond the ends of where it may be, one at a time. */
-enum part { MATERIAL, GLASS, ROUGH, POINT, SPOT, SUN, SPHERE, NUM_PARTS };
+enum part { MATERIAL, GLASS, ROUGH, PLASTIC, POINT, SPOT, SUN, SPHERE, NUM_PARTS };
 
 static float *number_of(struct scene *s, enum part part, size_t offset)
 {
     switch (part) {
     case GLASS: s->materials[0].kind = MATERIAL_GLASS; break;
     case ROUGH: s->materials[0].kind = MATERIAL_MICROFACET; break;
+    case PLASTIC: s->materials[0].kind = MATERIAL_PLASTIC; break;
     case SPOT: s->lights[0].kind = LIGHT_SPOT; break;
     case SUN: s->lights[0].kind = LIGHT_DIRECTIONAL; break;
     case MATERIAL:
@@ -341,6 +342,9 @@ TEST(every_number_is_looked_at)
         {ROUGH, EACH(material, eta), {0, 1, 1e9f}, {-1e-6f, -1, NAN, inf}, "index of refraction"},
         {ROUGH, EACH(material, k), {0, 1, 1e9f}, {-1e-6f, -1, NAN, inf}, "index of refraction"},
         {ROUGH, AT(material, alpha), 1, {low, 1, 1e9f}, {0.99f * low, -1, NAN, inf}, "roughness"},
+        {PLASTIC, AT(material, alpha), 1, {low, 1, 1e9f}, {0.99f * low, -1, NAN, inf}, "roughness"},
+        {PLASTIC, EACH(material, specular), {0, 1, .5f}, {-1e-6f, 1.0001f, NAN, inf}, "highlight"},
+        {PLASTIC, EACH(material, mirror), {0, 1, .5f}, {-1e-6f, 1.0001f, NAN, inf}, "highlight"},
         {GLASS,
          AT(material, ior),
          1,

@@ -1,13 +1,13 @@
 /* Scattering at a surface against itself (samples, density, value) and against double precision
  * routes of tests/support/optics.h. One seed, fixed n, no retry.
  *
- * The statistical tests run over the table {diffuse; GGX, Beckmann x alpha .02 .1 .3 .7 1} x
+ * The statistical tests run over the table {diffuse; GGX, Beckmann x alpha .02 .1 .3 .7 1; three plastics} x
  * {wo at 0, 30, 60, 80, 87 degrees}. H0: directions have the density bsdf_pdf_w() (chi-square over 80
  * patches and the samples that leave below the surface, patches that expect fewer than 10 pooled);
  * the samples lost below the surface have the chance that the density leaves (z); the mean weight is
  * the integral of f cos (z). Alpha 1e-4 for the whole file, Bonferroni over TESTS. n = 40000: a
  * roughness off by 15 % has a noncentrality of several hundred, power 1 - 1e-9; it is the negative
- * control in every row. */
+ * control in every row, for plastics the shares of the lobes exchanged. */
 #include "renderer/shading/bsdf.h"
 #include "renderer/shading/fresnel.h"
 #include "renderer/shading/microfacet.h"
@@ -17,8 +17,16 @@
 
 #include <gsl/gsl_cdf.h>
 
-enum { SAMPLES = 40000, TAUS = 10, PSIS = 8, PATCHES = TAUS * PSIS, ANGLES = 5, ROUGH = 5 };
-enum { SPECS = 1 + 2 * ROUGH, ROWS = SPECS * ANGLES, TESTS = 3 * ROWS };
+enum {
+    SAMPLES = 40000,
+    TAUS = 10,
+    PSIS = 8,
+    PATCHES = TAUS * PSIS,
+    ANGLES = 5,
+    ROUGH = 5,
+    PLASTICS = 3
+};
+enum { SPECS = 1 + 2 * ROUGH + PLASTICS, ROWS = SPECS * ANGLES, TESTS = 3 * ROWS };
 
 static const uint64_t SEED = 20260203;
 static const double ALPHA = 1e-4 / TESTS;
@@ -34,8 +42,24 @@ static struct material metal(enum microfacet_kind kind, double alpha)
                              .reflectance = grey(1)};
 }
 
+static struct material plastic(double diffuse, double specular, double mirror, double alpha)
+{
+    return (struct material){.kind = MATERIAL_PLASTIC,
+                             .microfacet = MICROFACET_BECKMANN,
+                             .separable = true,
+                             .alpha = (float)alpha,
+                             .reflectance = grey((float)diffuse),
+                             .specular = grey((float)specular),
+                             .mirror = grey((float)mirror)};
+}
+
 static struct material spec(int i)
 {
+    static const double of_plastic[PLASTICS][3] = {{.3, .6, .1}, {.6, .25, .5}, {.7, .2, .05}};
+    if (i > 2 * ROUGH) {
+        const double *p = of_plastic[i - 1 - 2 * ROUGH];
+        return plastic(p[0], p[1], 0, p[2]);
+    }
     if (i == 0)
         return (struct material){.kind = MATERIAL_DIFFUSE, .reflectance = grey(1), .alpha = 1};
     return metal(i <= ROUGH ? MICROFACET_GGX : MICROFACET_BECKMANN, roughness[(i - 1) % ROUGH]);
@@ -44,6 +68,7 @@ static struct material spec(int i)
 static const char *name_of(const struct material *m)
 {
     return m->kind == MATERIAL_DIFFUSE       ? "diffuse"
+           : m->kind == MATERIAL_PLASTIC     ? "plastic"
            : m->microfacet == MICROFACET_GGX ? "GGX"
                                              : "Beckmann";
 }
@@ -189,7 +214,12 @@ static void check_row(int i, int a)
     if (p < ALPHA)
         fail_msg("%s %g at %g: chi-square has p = %.3g", name_of(&m), (double)m.alpha, angle[a], p);
     struct material rougher = m;
-    rougher.alpha *= 1.15f;
+    if (m.kind == MATERIAL_PLASTIC) {
+        rougher.reflectance = m.specular;
+        rougher.specular = m.reflectance;
+    } else {
+        rougher.alpha *= 1.15f;
+    }
     struct pair control = {&rougher, pair.wo};
     shares(&v, m.kind == MATERIAL_DIFFUSE ? uniform_density : density, &control, other);
     other[PATCHES] = fmax(0, other[PATCHES]);
@@ -278,6 +308,57 @@ TEST(values_and_reciprocity)
                         fabs((double)value[c] - wrong) > 1e-3 * wrong + 1e-6);
         }
     }
+}
+
+/* f = kd/pi + ks D G / (4 cos cos), sampled by shares in proportion to the largest colours; the mirror's share of the samples
+ * has the weight kr over that share. */
+TEST(plastic_is_the_sum_of_its_lobes)
+{
+    int told = 0, rounds = 5000;
+    for (uint32_t i = 0; i < (uint32_t)rounds; i++) {
+        struct sample4 u = sampler_get(SEED, 1001, i, 1, 0), k = sampler_get(SEED, 1001, i, 1, 1),
+                       w = sampler_get(SEED, 1001, i, 1, 2);
+        const double alpha = roughness[1 + (int)(k.u[3] * (ROUGH - 1))];
+        struct material m = plastic(0, 0, 0, alpha), facets = metal(MICROFACET_BECKMANN, alpha);
+        m.reflectance = (rgb){0.1f, 0.5f * k.u[0], 0.3f};
+        m.specular = (rgb){0.4f * k.u[1], 0.1f, 0.2f};
+        m.mirror = (rgb){0.1f, 0.2f, 0.1f + 0.2f * k.u[2]};
+        facets.separable = true;
+        const double kd = fmax(0.3, (double)m.reflectance.g), ks = fmax(0.2, (double)m.specular.r),
+                     kr = fmax(0.2, (double)m.mirror.b), all = kd + ks + kr;
+        vec3 wo = normalize(v3(2 * u.u[0] - 1, 2 * u.u[1] - 1, 0.02f + u.u[2]));
+        vec3 wi = normalize(v3(2 * w.u[0] - 1, 2 * w.u[1] - 1, 0.02f + w.u[2]));
+        const double o[3] = {(double)wo.x, (double)wo.y, (double)wo.z};
+        const double in[3] = {(double)wi.x, (double)wi.y, (double)wi.z};
+        const struct optics_metal rough = {.separable = true, .alpha = alpha};
+        const double lobe = optics_metal_f_cos(&rough, o, in) / in[2];
+        rgb f = bsdf_eval(&m, wo, wi), back = bsdf_eval(&m, wi, wo);
+        const double expected = (double)m.reflectance.g / M_PI + (double)m.specular.g * lobe;
+        assert_near(f.g, expected, 1e-3 * expected + 1e-6);
+        assert_near(f.r, (double)m.reflectance.r / M_PI + (double)m.specular.r * lobe,
+                    1e-3 * (double)f.r + 1e-6);
+        assert_true(fabsf(f.b - back.b) <= 1e-4f * f.b + 1e-7f);
+        const double of_facets = (double)bsdf_pdf_w(&facets, wo, wi),
+                     pdf_w = (double)bsdf_pdf_w(&m, wo, wi);
+        const double mixed = kd / all * in[2] / M_PI + ks / all * of_facets;
+        assert_near(pdf_w, mixed, 1e-5 * mixed + 1e-7);
+        /* Negative control: lobes that are picked by even chances. */
+        const double even = (in[2] / M_PI + of_facets) / 3;
+        told += fabs(pdf_w - even) > 0.01 * even;
+        struct bsdf_sample s =
+            bsdf_sample_direction(&m, true, wo, w.u[0], w.u[1], (float)(kr / all - 1e-5));
+        assert_true(s.delta && s.pdf_w == 1 && s.wi.x == -wo.x && s.wi.z == wo.z);
+        assert_near(s.weight.g, (double)m.mirror.g / (kr / all), 1e-5);
+        s = bsdf_sample_direction(&m, true, wo, w.u[0], w.u[1], (float)(kr / all + 1e-5));
+        assert_true(!s.delta);
+        s = bsdf_sample_direction(&m, true, wo, w.u[0], w.u[1], 1 - 0x1p-24f);
+        const vec3 cosine = warp_cosine_hemisphere(w.u[0], w.u[1]);
+        assert_true(!s.delta && s.wi.x == cosine.x && s.wi.z == cosine.z && s.pdf_w > 0);
+        /* No weight is above all lobes together. */
+        assert_true((double)rgb_max(s.weight) <= all * 1.0001);
+    }
+    assert_true(told > rounds * 9 / 10);
+    assert_true(!bsdf_is_delta(&(struct material){.kind = MATERIAL_PLASTIC}));
 }
 
 struct facet {

@@ -511,7 +511,13 @@ TEST(albedo_layer_of_materials)
                 .eta = {2, 1, 1.5f},
                 .k = {3, 0, 1},
                 .alpha = 0.3f},
-               {10.0 / 18, 0, 1.25 / 7.25}}};
+               {10.0 / 18, 0, 1.25 / 7.25}},
+              {{.kind = MATERIAL_PLASTIC,
+                .reflectance = {0.1f, 0.2f, 0.3f},
+                .specular = {0.2f, 0.2f, 0.1f},
+                .mirror = {0.1f, 0, 0.2f},
+                .alpha = 0.3f},
+               {0.4, 0.4, 0.6}}};
     for (size_t i = 0; i < COUNT(of); i++) {
         struct fixture f = {.scene = build_scene()};
         uint32_t m = build_material(&f.scene, grey(0), grey(0));

@@ -48,6 +48,10 @@ static struct scene build(const struct variant *v)
     s.materials[glass].transmittance = permuted(v, .8f, .9f, 1);
     s.materials[glass].ior = 1.5f;
     build_quad(&s, v3(-1, 0, 1), v3(2, 0, 0), v3(0, 0, -2), grey);
+    s.materials[red].kind = MATERIAL_PLASTIC;
+    s.materials[red].specular = permuted(v, .1f, .2f, .3f);
+    s.materials[red].mirror = permuted(v, .1f, .05f, .2f);
+    s.materials[red].alpha = 0.4f;
     build_quad(&s, v3(-1, 0, -1), v3(2, 0, 0), v3(0, 1.5f, 0), red);
     build_sphere(&s, v3(-.45f, .35f, -.2f), .35f, 1, metal);
     build_sphere(&s, v3(.5f, .3f, .3f), .3f, 1, glass);

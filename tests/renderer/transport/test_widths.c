@@ -58,11 +58,18 @@ static struct scene all_kinds(void)
          .eta = {1.2f, 0.9f, 0},
          .k = {3.9f, 0.1f, 0},
          .alpha = 0.2f},
+        {.kind = MATERIAL_PLASTIC,
+         .reflectance = {0.3f, 0.2f, 0.1f},
+         .specular = {0.2f, 0.4f, 0.3f},
+         .mirror = {0.1f, 0.2f, 0.1f},
+         .microfacet = MICROFACET_BECKMANN,
+         .separable = true,
+         .alpha = 0.2f},
     };
     add_room(&s, build_material(&s, grey(0.7f), grey(0)));
-    for (int i = 0; i < 7; i++) {
+    for (int i = 0; i < 8; i++) {
         uint32_t m = material_like(&s, kinds[i]);
-        float x = -0.75f + 0.25f * (float)i, z = 0.3f - 0.3f * (float)(i % 3);
+        float x = -0.75f + 0.2f * (float)i, z = 0.3f - 0.3f * (float)(i % 3);
         if (i % 2 == 0)
             build_sphere(&s, v3(x, 0.25f + 0.1f * (float)(i % 4), z), 0.15f, 1, m);
         else
@@ -133,6 +140,9 @@ static struct scene textured(void)
     add_room(&s, build_material(&s, (rgb){0.8f, 0.7f, 0.6f}, grey(0)));
     s.materials[0].reflectance_map = 2;
     s.materials[1].reflectance_map = 3;
+    s.materials[1].kind = MATERIAL_PLASTIC;
+    s.materials[1].specular = (rgb){0.1f, 0.2f, 0};
+    s.materials[1].alpha = 0.3f;
     build_uv(&s, 0, 3, (struct uv){-1.3f, -1.1f});
     for (int i = 0; i < 6; i++) {
         uint32_t lamp = build_material(&s, grey(0.4f), (rgb){4, 5, 6});
