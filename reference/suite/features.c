@@ -159,6 +159,8 @@ bool features_check_clipping(const char *engine, const struct scene *s, const st
                              struct err *e)
 {
     double nearest, furthest;
+    if (scene_num_primitives(s) == 0)
+        return err_set(e, "%s: nothing to see: no triangles, no spheres", engine);
     features_distances(s, c->eye, &nearest, &furthest);
     return !may_be_cut(s, c) ||
            err_set(e,
@@ -225,6 +227,8 @@ bool features_clip_depths(const char *engine, const struct scene *s, const struc
 {
     *near = 0;
     *far = INFINITY;
+    if (scene_num_primitives(s) == 0)
+        return features_check_clipping(engine, s, c, e);
     if (!may_be_cut(s, c))
         return true;
     struct layers l = find_layers(s, c);

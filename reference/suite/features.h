@@ -44,7 +44,8 @@ void features_distances(const struct scene *s, vec3 eye, double *nearest, double
 /* What a kind of material is called in the line of an engine that does not have it. */
 extern const char *const features_material_names[NUM_MATERIAL_KINDS];
 
-/* For the writers of scene files; each fails with `engine` in front. Where the near or far plane may cut geometry: */
+/* For the writers of scene files; each fails with `engine` in front. Where the near or far plane may cut geometry, and
+ * where there is none: */
 bool features_check_clipping(const char *engine, const struct scene *s, const struct camera *c,
                              struct err *e) __attribute__((warn_unused_result));
 /* For engines that clip by depth, we by distance. Where each primitive in front of the camera lies wholly before the near

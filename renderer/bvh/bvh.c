@@ -27,6 +27,8 @@ struct bvh *bvh_build_on(const struct scene *s, enum bvh_kind kind, enum isa isa
     struct bvh *t = calloc(1, sizeof *t);
     if (t == NULL)
         goto fail;
+    if (scene_num_primitives(s) == 0)
+        kind = BVH_BRUTE_FORCE;
     if (kind == BVH_WIDE) {
         t->wide = wide_build(s, isa == ISA_SCALAR ? ISA_AUTO : isa, threads, e);
         if (t->wide != NULL)
@@ -36,8 +38,8 @@ struct bvh *bvh_build_on(const struct scene *s, enum bvh_kind kind, enum isa isa
     }
     t->scene = s;
     t->num_primitives = scene_num_primitives(s);
-    t->order = malloc(t->num_primitives * sizeof *t->order);
-    t->triangles = calloc(t->num_primitives, sizeof *t->triangles);
+    t->order = malloc(((size_t)t->num_primitives + 1) * sizeof *t->order);
+    t->triangles = calloc((size_t)t->num_primitives + 1, sizeof *t->triangles);
     if (t->order == NULL || t->triangles == NULL)
         goto fail;
     for (uint32_t i = 0; i < t->num_primitives; i++)

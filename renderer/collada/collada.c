@@ -358,13 +358,30 @@ static bool check_libraries(struct loader *ld, const xmlNode *root)
     return true;
 }
 
+/* Of a file that shows none: its only one, NULL if there is none. */
+static bool find_only_visual_scene(struct loader *ld, const xmlNode *root, const xmlNode **out)
+{
+    *out = NULL;
+    for (const xmlNode *c = element_first_child(root); c != NULL; c = element_next_sibling(c))
+        for (const xmlNode *v = element_is(c, "library_visual_scenes") ? element_first_child(c)
+                                                                       : NULL;
+             v != NULL; v = element_next_sibling(v)) {
+            if (!element_is(v, "visual_scene"))
+                continue;
+            if (*out != NULL)
+                return fail_at(ld, root, "no <scene>, and more than one <visual_scene>");
+            *out = v;
+        }
+    return true;
+}
+
 static bool find_visual_scene(struct loader *ld, const xmlNode *root, const xmlNode **out)
 {
     xmlNode *scene, *instance;
     if (!element_one_child(ld, root, "scene", &scene))
         return false;
     if (scene == NULL)
-        return fail_at(ld, root, "no <scene>");
+        return find_only_visual_scene(ld, root, out);
     if (!element_only_children(ld, scene,
                                "instance_visual_scene instance_physics_scene "
                                "instance_kinematics_scene extra") ||
@@ -381,9 +398,10 @@ static bool read_scene(struct loader *ld, const xmlNode *root)
     const xmlNode *visual;
     const struct frame world = {.unit = 1};
     struct place top = {.depth = 0};
-    if (!check_libraries(ld, root) || !find_visual_scene(ld, root, &visual) ||
-        !element_only_children(ld, visual, "asset node extra") ||
-        !enter(ld, visual, &world, &top.frame, &top.to_world))
+    if (!check_libraries(ld, root) || !find_visual_scene(ld, root, &visual))
+        return false;
+    if (visual != NULL && (!element_only_children(ld, visual, "asset node extra") ||
+                           !enter(ld, visual, &world, &top.frame, &top.to_world)))
         return false;
     /* Other documents than those of Y_UP are turned, too, as the assignment turns them. */
     if (top.frame.up != 0)
@@ -391,13 +409,17 @@ static bool read_scene(struct loader *ld, const xmlNode *root)
             top.to_world.m[0][j] = -top.to_world.m[0][j];
             top.to_world.m[2][j] = -top.to_world.m[2][j];
         }
-    for (const xmlNode *c = element_first_child(visual); c != NULL; c = element_next_sibling(c))
+    for (const xmlNode *c = visual != NULL ? element_first_child(visual) : NULL; c != NULL;
+         c = element_next_sibling(c))
         if (element_is(c, "node") && !walk(ld, c, &top))
             return false;
     if (!light_finish(ld))
         return false;
     if (scene_num_primitives(&ld->scene) == 0)
-        return fail_at(ld, visual, "nothing to render: no triangles, no spheres");
+        add_note(ld, visual == NULL ? "nothing to see: no <scene>"
+                                    : "nothing to see: no triangles, no spheres");
+    else if (element_child_named(root, "scene") == NULL)
+        add_note(ld, "no <scene>: the only <visual_scene> is shown");
     ld->scene.dialect = ld->dialect;
     write_notes(ld);
     if (ld->dialect == DIALECT_COLLADA)

@@ -232,6 +232,8 @@ static bool check_primitives(const struct scene *s, const char *where, struct er
 static void find_bounds(struct scene *s)
 {
     vec3 lo = v3(FLT_MAX, FLT_MAX, FLT_MAX), hi = neg(lo);
+    if (scene_num_primitives(s) == 0)
+        lo = hi = v3(0, 0, 0);
     for (size_t k = 0; k < 3 * (size_t)s->num_triangles; k++) {
         lo = vmin(lo, s->position[k]);
         hi = vmax(hi, s->position[k]);
@@ -307,8 +309,6 @@ static bool make_room(struct scene *s)
 
 bool scene_finish(struct scene *s, const char *where, struct err *e)
 {
-    if (s->num_triangles == 0 && s->num_spheres == 0)
-        return err_set(e, "%s: nothing to render: no triangles, no spheres", where);
     if (s->num_objects > INT32_MAX / 2 || s->num_spheres > INT32_MAX / 2 ||
         s->num_lights > INT32_MAX / 2 || s->num_triangles > UINT32_MAX / 4)
         return err_set(e, "%s: too many primitives", where);

@@ -162,7 +162,7 @@ struct scene {
     struct scene_camera camera;   /* the one to see by: the first, in the CGL dialect the last */
     struct scene_camera *cameras; /* all */
     uint32_t num_cameras;
-    vec3 bounds_min, bounds_max; /* of all primitives */
+    vec3 bounds_min, bounds_max; /* of all primitives; 0 if there are none */
     /* What the assignment's camera is framed on. CGL: the bounds without the rectangles of area
      * lights, with the meshes that gave way to them; else the bounds. */
     vec3 frame_min, frame_max;
@@ -190,8 +190,8 @@ static inline bool material_has_map(const struct material *m)
  * tri_light and sphere_light, fills areas and bounds. `lights` must come from malloc() or be NULL.
  * Fails on an index out of range, objects that are not contiguous, a value that is not finite, a
  * normal not of unit length, a negative reflectance or radiance, a reflectance above 1 (a texture's
- * counts), a texture on a sphere or a coordinate of it beyond 1e6, or a scene without primitives;
- * `where` starts the line. */
+ * counts), or a texture on a sphere or a coordinate of it beyond 1e6; `where` starts the line. A scene without
+ * primitives is fine. */
 bool scene_finish(struct scene *s, const char *where, struct err *e)
     __attribute__((warn_unused_result));
 

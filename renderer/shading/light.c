@@ -80,7 +80,10 @@ static bool build_records(struct light_table *t, const struct scene *s)
 static double light_power(const struct scene *s, const struct light *l)
 {
     const double pi = 3.14159265358979323846;
-    double r = 0.5 * (double)length(sub(s->bounds_max, s->bounds_min)), r2 = r * r;
+    double r = 0.5 * (double)length(sub(s->bounds_max, s->bounds_min));
+    if (scene_num_primitives(s) == 0)
+        r = 1; /* nothing is lit, whichever is chosen */
+    const double r2 = r * r;
     double falloff = (double)l->attenuation[0] + r * l->attenuation[1] + r2 * l->attenuation[2];
     switch (l->kind) {
     case LIGHT_POINT: return 4 * pi * rgb_luminance(l->value) / falloff * r2;

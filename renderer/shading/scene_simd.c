@@ -87,7 +87,8 @@ void scene_simd_material(const struct material *m, float r[MATERIAL_WORDS])
 struct scene_simd *scene_simd_build(const struct scene *s, struct err *e)
 {
     struct scene_simd *l = calloc(1, sizeof *l);
-    const size_t words = RECORD_WORDS * (size_t)scene_num_primitives(s);
+    /* What meets nothing reads the first. */
+    const size_t words = RECORD_WORDS * ((size_t)scene_num_primitives(s) + 1);
     if (l != NULL) {
         l->primitive = huge_alloc(words * sizeof *l->primitive);
         l->material = calloc(s->num_materials + 1, MATERIAL_WORDS * sizeof *l->material);

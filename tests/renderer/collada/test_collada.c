@@ -336,7 +336,7 @@ TEST(materials)
 }
 TEST(lights_and_cameras)
 {
-    run_file("tests/renderer/collada/light.cases", 47);
+    run_file("tests/renderer/collada/light.cases", 49);
 }
 TEST(refused)
 {

@@ -156,3 +156,37 @@ TEST(scene_of_several_files)
     REFUSES(collada_parse(text, strlen(text), path, DIALECT_AUTO, &s, &e), "leads elsewhere");
     MUST(fs_remove_tree(folder, &e));
 }
+
+/* Without <scene>: the only <visual_scene>, nothing if there is none, and an error if there are two. */
+TEST(file_without_scene)
+{
+#define VISUAL(id)                                                                                 \
+    "<library_visual_scenes><visual_scene id='" id "'><node><instance_camera url='#c'/></node>"    \
+    "</visual_scene></library_visual_scenes>"
+    static const struct {
+        const char *body, *says;
+        bool loads, sees;
+    } of[] = {
+        {"", "nothing to see: no <scene>", true, false},
+        {"<library_nodes><node id='n'/></library_nodes>", "nothing to see: no <scene>", true,
+         false},
+        {VISUAL("a"), "nothing to see: no triangles", true, true},
+        {VISUAL("a") VISUAL("b"), "no <scene>, and more than one <visual_scene>", false, false}};
+    for (size_t i = 0; i < COUNT(of); i++) {
+        char text[2048];
+        struct scene s = {0};
+        struct err e = {""};
+        snprintf(
+            text, sizeof text,
+            "<COLLADA version='1.4.1'><library_cameras><camera id='c'><optics><technique_common>"
+            "<perspective><yfov>60</yfov><znear>.5</znear><zfar>50</zfar></perspective>"
+            "</technique_common></optics></camera></library_cameras>%s</COLLADA>",
+            of[i].body);
+        const bool ok = collada_parse(text, strlen(text), "x.dae", DIALECT_AUTO, &s, &e);
+        assert_int_equal(ok, of[i].loads);
+        assert_non_null(strstr(ok ? s.note : e.msg, of[i].says));
+        assert_int_equal(s.camera.present, of[i].sees);
+        scene_free(&s);
+    }
+#undef VISUAL
+}

@@ -101,10 +101,6 @@ struct spoil {
     const char *keyword;
 };
 
-static void spoil_empty(struct scene *s)
-{
-    s->num_triangles = s->num_spheres = 0;
-}
 static void spoil_position(struct scene *s)
 {
     s->position[7].y = NAN;
@@ -244,7 +240,6 @@ static void spoil_lamp_area(struct scene *s)
 TEST(bad_scenes_are_refused)
 {
     static const struct spoil SPOILS[] = {
-        {spoil_empty, "no triangles"},
         {spoil_position, "triangle 2: position"},
         {spoil_normal, "triangle 1: normal"},
         {spoil_reflectance_high, "'paint': reflectance"},
@@ -310,6 +305,17 @@ static float *number_of(struct scene *s, enum part part, size_t offset)
                  : part < POINT ? (char *)&s->materials[0]
                                 : (char *)&s->lights[0];
     return (float *)(void *)(base + offset);
+}
+
+/* No division by its size: bounds of 0. */
+TEST(nothing_is_a_scene)
+{
+    struct scene s = make_scene();
+    struct err e = {""};
+    s.num_triangles = s.num_spheres = s.num_objects = 0;
+    MUST(scene_finish(&s, "room.dae", &e));
+    assert_true(s.num_lights == 1 && length(s.bounds_min) == 0 && length(s.frame_max) == 0);
+    scene_free(&s);
 }
 
 TEST(every_number_is_looked_at)
