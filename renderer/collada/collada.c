@@ -57,7 +57,7 @@ static bool read_asset(struct loader *ld, const xmlNode *element, struct frame *
     }
     if (up == NULL)
         return true;
-    if (element_is_one_of(element, "camera light library_cameras library_lights"))
+    if (element_is_one_of(element, "light library_lights"))
         return fail_at(ld, up, "<up_axis> of a <%s> is not supported", (const char *)element->name);
     char *axis = text_read_word(ld, up);
     if (axis == NULL)
@@ -69,6 +69,19 @@ static bool read_asset(struct loader *ld, const xmlNode *element, struct frame *
     f->up = i;
     free(axis);
     return known;
+}
+
+/* Takes coordinates from one frame to another, lengths times `size`. */
+static mat4 change_axes(int from, int to, double size)
+{
+    mat4 m = mat4_identity();
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            m.m[i][j] = 0;
+            for (int k = 0; k < 3; k++)
+                m.m[i][j] += AXES[to].m[k][i] * AXES[from].m[k][j] * size;
+        }
+    return m;
 }
 
 /* From the frame outside to that of an element; *change takes coordinates from there to outside. */
@@ -85,14 +98,7 @@ static bool enter(struct loader *ld, const xmlNode *element, const struct frame 
     if ((is_in_library && !read_asset(ld, element->parent, inside)) ||
         !read_asset(ld, element, inside))
         return false;
-    *change = mat4_identity();
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            change->m[i][j] = 0;
-            for (int k = 0; k < 3; k++)
-                change->m[i][j] += AXES[outside->up].m[k][i] * AXES[inside->up].m[k][j] *
-                                   (inside->unit / outside->unit);
-        }
+    *change = change_axes(inside->up, outside->up, inside->unit / outside->unit);
     return true;
 }
 
@@ -258,8 +264,16 @@ static bool read_content(struct loader *ld, const xmlNode *c, const struct place
             !enter(ld, target, &at->frame, &inside, &change))
             return false;
         ld->unit = inside.unit;
-        return is_light ? light_instance(ld, c, target, name_of(at->node), &at->to_world)
-                        : camera_instance(ld, c, target, name_of(at->node), &at->to_world);
+        if (is_light)
+            return light_instance(ld, c, target, name_of(at->node), &at->to_world);
+        /* A camera's own axes turn it as they would turn what it sees. */
+        struct frame home = target->doc == at->frame.doc ? at->frame : (struct frame){.unit = 1};
+        if (target->doc != at->frame.doc &&
+            !read_asset(ld, xmlDocGetRootElement(target->doc), &home))
+            return false;
+        change = change_axes(home.up, inside.up, 1);
+        const mat4 to_world = mat4_mul(&at->to_world, &change);
+        return camera_instance(ld, c, target, name_of(at->node), &to_world);
     }
     if (element_is_one_of(c, "matrix lookat translate rotate scale skew asset extra"))
         return true;
@@ -306,6 +320,7 @@ static void write_notes(struct loader *ld)
         "%u surfaces are wholly transparent, so left out",
         "%u surfaces without material are grey (0.8)",
         "%u materials, which reflect more than all light together, are darkened",
+        "%u polygons cross themselves, so are cut from their first corner",
         "%u lights of Blender have no radius here: set theirs to 0, or give an area light",
         "%u spots of Blender have a sharp edge here: set their blend to 0",
         "%u upright cameras of Blender: right if its sensor fit is horizontal"};

@@ -211,8 +211,8 @@ static bool read_effect(struct loader *ld, const xmlNode *effect, struct materia
     bool is_cgl = technique != NULL && strcmp(element_attribute(technique, "profile"), "CGL") == 0;
     if (is_cgl)
         return extra_read_material(ld, technique, m);
-    if (common == NULL && ld->dialect == DIALECT_COLLADA)
-        return fail_at(ld, effect, "<effect> without <profile_COMMON>");
+    if (common == NULL && technique == NULL) /* of shaders alone: as no material */
+        ld->num_left_out[LEFT_OUT_MATERIAL] += ld->dialect == DIALECT_COLLADA;
     if (common != NULL && !read_common(ld, common, m))
         return false;
     if (technique != NULL && ld->is_transparent)

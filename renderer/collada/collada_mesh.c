@@ -153,7 +153,7 @@ static bool add_polygon(struct loader *ld, struct mesh *m, const xmlNode *p, str
     switch (triangulate(work->points, (uint32_t)n, work->index)) {
     case TRIANGULATE_OK:
     case TRIANGULATE_FLAT: break;
-    case TRIANGULATE_CROSSED: return fail_at(ld, p, "polygon %zu crosses itself", which);
+    case TRIANGULATE_CROSSED: ld->num_left_out[LEFT_OUT_CROSSED]++; break;
     case TRIANGULATE_MEMORY: return fail_memory(ld);
     }
     for (size_t t = 0; t < n - 2; t++) {

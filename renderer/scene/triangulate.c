@@ -180,6 +180,8 @@ enum triangulate_result triangulate(const dvec3 *p, uint32_t n, uint32_t *index)
     if (sum <= area * (1 + 1e-6))
         result = TRIANGULATE_OK;
 done:
+    if (result == TRIANGULATE_CROSSED)
+        fan(n, index);
     free(q);
     free(link);
     return result;

@@ -10,7 +10,7 @@
 enum triangulate_result {
     TRIANGULATE_OK,
     TRIANGULATE_FLAT,    /* all vertices on a line: the triangles have no area */
-    TRIANGULATE_CROSSED, /* its edges cross each other */
+    TRIANGULATE_CROSSED, /* its edges cross each other: a fan from p[0] */
     TRIANGULATE_MEMORY
 };
 
