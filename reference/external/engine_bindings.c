@@ -29,7 +29,7 @@ static const struct {
     {"cycles", .write = export_cycles, .driver = &cycles_driver},
     {"povray", .print = print_povray, .driver = &povray_driver},
     {"mitsuba", .write = export_mitsuba},
-    {"pbrt", .print = export_pbrt},
+    {"pbrt", .write = export_pbrt},
 };
 
 enum { NUM_BINDINGS = sizeof bindings / sizeof *bindings };

@@ -2,14 +2,18 @@
 
 #include "reference/suite/features.h"
 
+#include "renderer/base/fs.h"
+#include "renderer/image/image.h"
 #include "renderer/scene/environment.h"
 
 #include <assert.h>
 #include <gsl/gsl_math.h>
+#include <string.h>
 
 struct writer {
     FILE *f;
     const struct scene *s;
+    const char *path; /* of the text */
 };
 
 static void put3(const struct writer *w, const char *type, const char *name, double x, double y,
@@ -75,9 +79,14 @@ static bool is_one(rgb c)
     return c.r == 1 && c.g == 1 && c.b == 1;
 }
 
+static bool is_grey(rgb c)
+{
+    return c.r == c.g && c.g == c.b && c.r <= 1;
+}
+
 static const char *what_mirrors_lack(const struct material *m)
 {
-    return is_one(m->reflectance) ? NULL : "a mirror whose reflectance is not 1";
+    return is_grey(m->reflectance) ? NULL : "a mirror of a colour (each channel by itself is grey)";
 }
 
 static const char *what_glass_lacks(const struct material *m)
@@ -93,9 +102,9 @@ static const char *what_metals_lack(const struct material *m)
         return "Beckmann's distribution";
     if (m->separable)
         return "shadowing and masking that are independent";
-    return m->conductor || is_one(m->reflectance)
+    return m->conductor || is_grey(m->reflectance)
                ? NULL
-               : "a rough metal without an index of refraction whose reflectance is not 1";
+               : "a rough metal of a colour without an index of refraction (each channel by itself is grey)";
 }
 
 static void put_diffuse(const struct writer *w, const struct material *m)
@@ -131,6 +140,18 @@ static const struct {
                               [MATERIAL_GLASS] = {"dielectric", what_glass_lacks, put_glass},
                               [MATERIAL_MICROFACET] = {"conductor", what_metals_lack, put_metal}};
 
+/* A reflectance below 1 at every angle, which no index of refraction has: pbrt takes one of the two at random, the second with
+ * the probability of `amount`. What it calls 1 is 0.9999. */
+static void put_part(const struct writer *w, uint32_t index, double reflectance)
+{
+    fprintf(w->f, "MakeNamedMaterial \"material_%u_black\" \"string type\" [\"diffuse\"]", index);
+    put_rgb(w, "reflectance", grey(0));
+    fprintf(w->f,
+            "\nMakeNamedMaterial \"material_%u\" \"string type\" [\"mix\"] \"string materials\" "
+            "[\"material_%u_whole\" \"material_%u_black\"] \"float amount\" [%.9g]\n",
+            index, index, index, fmax(0, 1 - reflectance / 0.9999));
+}
+
 static bool put_material(const struct writer *w, uint32_t index, struct err *e)
 {
     const struct material *m = &w->s->materials[index];
@@ -141,10 +162,14 @@ static bool put_material(const struct writer *w, uint32_t index, struct err *e)
         missing = KIND[m->kind].missing(m);
     if (missing != NULL)
         return err_set(e, "pbrt does not have %s (material '%s')", missing, m->name);
-    fprintf(w->f, "MakeNamedMaterial \"material_%u\" \"string type\" [\"%s\"]", index,
-            KIND[m->kind].type);
+    bool darker = m->kind == MATERIAL_MIRROR || (m->kind == MATERIAL_MICROFACET && !m->conductor);
+    darker = darker && !is_one(m->reflectance);
+    fprintf(w->f, "MakeNamedMaterial \"material_%u%s\" \"string type\" [\"%s\"]", index,
+            darker ? "_whole" : "", KIND[m->kind].type);
     KIND[m->kind].put(w, m);
     fputc('\n', w->f);
+    if (darker)
+        put_part(w, index, (double)m->reflectance.r);
     return true;
 }
 
@@ -195,13 +220,63 @@ static void put_object(const struct writer *w, const struct object *o)
     fputs("AttributeEnd\n", w->f);
 }
 
+/* The direction of a point of the unit square in pbrt's map of the sphere, which keeps areas [Clarberg08]. */
+static vec3 square_to_sphere(double x, double y)
+{
+    double u = 2 * x - 1, v = 2 * y - 1, from_rim = 1 - (fabs(u) + fabs(v));
+    double r = 1 - fabs(from_rim), phi = (r == 0 ? 1 : (fabs(v) - fabs(u)) / r + 1) * M_PI / 4;
+    double across = r * sqrt(2 - r * r);
+    return v3((float)copysign(cos(phi) * across, u), (float)copysign(sin(phi) * across, v),
+              (float)copysign(1 - r * r, from_rim));
+}
+
+/* pbrt looks texels up without interpolation: each of ours is so many times as high and as wide as one of its image. */
+enum { TEXELS_PER_ROW = 16, MOST_TEXELS = 4096, MOST_ROWS = 512 };
+
+static bool put_sky_image(const struct writer *w, uint32_t rows, struct err *e)
+{
+    struct path name = fs_path("%s", w->path);
+    char *slash = strrchr(name.s, '/'), *dot = strrchr(name.s, '.');
+    struct image im;
+    int side = (int)rows * TEXELS_PER_ROW;
+    if (rows > MOST_ROWS)
+        return err_set(
+            e,
+            "pbrt: an environment image of %u rows, at most %d have their like in one of "
+            "%d x %d texels without interpolation",
+            rows, MOST_ROWS, MOST_TEXELS, MOST_TEXELS);
+    if (dot != NULL && (slash == NULL || dot > slash + 1))
+        *dot = '\0';
+    name = fs_path("%s_environment.exr", name.s);
+    side = side < MOST_TEXELS ? side : MOST_TEXELS;
+    if (!image_alloc(&im, side, side, 3, (const char *const[]){"R", "G", "B"}, e))
+        return false;
+    for (int y = 0; y < side; y++)
+        for (int x = 0; x < side; x++) {
+            rgb mean = grey(0);
+            for (int k = 0; k < 4; k++)
+                mean = rgb_add(mean, environment_radiance(
+                                         w->s->environment,
+                                         square_to_sphere((x + 0.25 + 0.5 * (k & 1)) / side,
+                                                          (y + 0.25 + 0.5 * (k >> 1)) / side)));
+            const float texel[3] = {mean.r / 4, mean.g / 4, mean.b / 4};
+            memcpy(im.data + 3 * ((size_t)y * (size_t)side + (size_t)x), texel, sizeof texel);
+        }
+    bool ok = image_write_exr(name.s, &im, e);
+    image_free(&im);
+    slash = strrchr(name.s, '/');
+    fprintf(w->f, "LightSource \"infinite\" \"string filename\" [\"%s\"]\n",
+            slash != NULL ? slash + 1 : name.s);
+    return ok;
+}
+
 static bool put_sky(const struct writer *w, struct err *e)
 {
     struct environment_parts sky = environment_parts(w->s->environment);
     if (environment_is_hidden(w->s->environment))
         return err_set(e, "pbrt has no ambient light that only rough surfaces receive");
     if (sky.kind == ENVIRONMENT_IMAGE)
-        return err_set(e, "pbrt has no environment image in latitude and longitude");
+        return put_sky_image(w, sky.height, e);
     fputs("LightSource \"infinite\"", w->f);
     put_rgb(w, "L", sky.radiance);
     fputc('\n', w->f);
@@ -248,24 +323,33 @@ static bool put_light(const struct writer *w, uint32_t index, struct err *e)
     return true;
 }
 
-bool export_pbrt(const struct scene *s, const struct camera *c, int depth, FILE *f, struct err *e)
+static bool put_scene(const struct writer *w, const struct camera *c, int depth, struct err *e)
 {
-    assert(depth >= 0);
-    struct writer w = {f, s};
-    if (!features_check_exportable("pbrt", s, c, e))
-        return false;
-    fprintf(f,
+    fprintf(w->f,
             "# pbrt --spp 64 --seed 1 --outfile OUT.exr THIS\n"
             "Integrator \"path\" \"integer maxdepth\" [%d] \"bool regularize\" [false]\n",
             depth);
-    put_camera(&w, c);
-    fputs("WorldBegin\n", f);
+    put_camera(w, c);
+    fputs("WorldBegin\n", w->f);
     bool ok = true;
-    for (uint32_t i = 0; ok && i < s->num_materials; i++)
-        ok = put_material(&w, i, e);
-    for (uint32_t i = 0; ok && i < s->num_lights; i++)
-        ok = put_light(&w, i, e);
-    for (uint32_t i = 0; ok && i < s->num_objects; i++)
-        put_object(&w, &s->objects[i]);
-    return ok && (!ferror(f) || err_set(e, "cannot write the pbrt scene"));
+    for (uint32_t i = 0; ok && i < w->s->num_materials; i++)
+        ok = put_material(w, i, e);
+    for (uint32_t i = 0; ok && i < w->s->num_lights; i++)
+        ok = put_light(w, i, e);
+    for (uint32_t i = 0; ok && i < w->s->num_objects; i++)
+        put_object(w, &w->s->objects[i]);
+    return ok;
+}
+
+bool export_pbrt(const struct scene *s, const struct camera *c, int depth, const char *path,
+                 struct err *e)
+{
+    struct out_file out;
+    assert(depth >= 0);
+    if (!features_check_exportable("pbrt", s, c, e) || !out_open(&out, path, e))
+        return false;
+    if (put_scene(&(struct writer){out.f, s, path}, c, depth, e))
+        return out_commit(&out, e);
+    out_abandon(&out);
+    return false;
 }
