@@ -1,6 +1,7 @@
 #include "collada_internal.h"
 
 #include "renderer/base/fs.h"
+#include "renderer/base/number.h"
 
 #include <errno.h>
 #include <stdio.h>
@@ -24,51 +25,32 @@ struct place {
     int depth;
 };
 
+static const double DEGREE = 3.14159265358979323846 / 180;
+
 /* To Y_UP, by the table of the specification. */
-static const struct axes {
-    const char *name;
-    double m[3][3];
-} AXES[] = {{"Y_UP", {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}},
-            {"X_UP", {{0, -1, 0}, {1, 0, 0}, {0, 0, 1}}},
-            {"Z_UP", {{1, 0, 0}, {0, 0, 1}, {0, -1, 0}}}};
+static const char AXIS_NAMES[] = "Y_UP X_UP Z_UP";
+static const double AXES[][3][3] = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
+                                    {{0, -1, 0}, {1, 0, 0}, {0, 0, 1}},
+                                    {{1, 0, 0}, {0, 0, 1}, {0, -1, 0}}};
 
 /* The element's own <asset>, on top of what is in *f. */
-static bool read_asset(struct loader *ld, const xmlNode *element, struct frame *f)
+static void read_asset(struct loader *ld, const xmlNode *element, struct frame *f)
 {
-    xmlNode *asset, *unit, *up;
-    if (!element_one_child(ld, element, "asset", &asset))
-        return false;
-    if (asset == NULL)
-        return true;
-    if (!element_only_children(
-            ld, asset,
-            "contributor coverage created keywords modified revision subject title unit "
-            "up_axis extra") ||
-        !element_one_child(ld, asset, "unit", &unit) ||
-        !element_one_child(ld, asset, "up_axis", &up))
-        return false;
-    const char *meter = unit != NULL ? element_attribute(unit, "meter") : NULL;
-    if (meter != NULL && ld->dialect == DIALECT_COLLADA) {
-        char *end;
-        bool plain = meter[0] != '\0' && meter[strspn(meter, "0123456789+-.eE")] == '\0';
-        f->unit = strtod(meter, &end);
-        if (!plain || *end != '\0' || !(f->unit >= 1e-18 && f->unit <= FARTHEST))
-            return fail_at(ld, unit, "<unit>: meter=\"%.60s\" is not a positive number", meter);
-    }
-    if (up == NULL)
-        return true;
-    if (element_is_one_of(element, "light library_lights"))
-        return fail_at(ld, up, "<up_axis> of a <%s> is not supported", (const char *)element->name);
-    char *axis = text_read_word(ld, up);
-    if (axis == NULL)
-        return false;
-    int i = 2;
-    while (i >= 0 && strcmp(axis, AXES[i].name) != 0)
-        i--;
-    bool known = i >= 0 || fail_at(ld, up, "unknown <up_axis> '%.60s'", axis);
-    f->up = i;
-    free(axis);
-    return known;
+    const xmlNode *asset = element_first_child(element); /* there, as the survey has seen */
+    if (!element_is(asset, "asset"))
+        return;
+    const xmlNode *unit = element_child(asset, "unit"), *up = element_child(asset, "up_axis");
+    const char *meter = element_attribute(unit, "meter"), *end = meter;
+    element_check(ld, asset,
+                  "contributor* coverage? created* keywords* modified* revision* subject* title* "
+                  "unit? up_axis? extra*");
+    if (meter != NULL && ld->dialect == DIALECT_COLLADA &&
+        !(number_parse(meter, &end, &f->unit) && *end == '\0' && f->unit >= 1e-18 &&
+          f->unit <= FARTHEST))
+        fail_at(ld, unit, "<unit>: meter=\"%.60s\" is not a positive number", meter);
+    if (up != NULL && element_is_one_of(element, "light library_lights"))
+        fail_at(ld, up, "<up_axis> of a <%s> is not supported", (const char *)element->name);
+    f->up = field_choice(ld, asset, "up_axis", AXIS_NAMES, f->up);
 }
 
 /* Takes coordinates from one frame to another, lengths times `size`. */
@@ -79,108 +61,99 @@ static mat4 change_axes(int from, int to, double size)
         for (int j = 0; j < 3; j++) {
             m.m[i][j] = 0;
             for (int k = 0; k < 3; k++)
-                m.m[i][j] += AXES[to].m[k][i] * AXES[from].m[k][j] * size;
+                m.m[i][j] += AXES[to][k][i] * AXES[from][k][j] * size;
         }
     return m;
 }
 
-/* From the frame outside to that of an element; *change takes coordinates from there to outside. */
-static bool enter(struct loader *ld, const xmlNode *element, const struct frame *outside,
-                  struct frame *inside, mat4 *change)
+/* The frame of an element that one of the frame `outside` names, but for what itself and its library say. */
+static struct frame home_of(struct loader *ld, const xmlNode *element, const struct frame *outside)
+{
+    struct frame home = {.doc = element->doc, .unit = 1};
+    if (element->doc == outside->doc)
+        return *outside;
+    read_asset(ld, xmlDocGetRootElement(element->doc), &home);
+    return home;
+}
+
+/* From the frame outside to that of an element; the change takes coordinates from there to outside. */
+static mat4 enter(struct loader *ld, const xmlNode *element, const struct frame *outside,
+                  struct frame *inside)
 {
     *inside = *outside;
-    if (element->doc != outside->doc) {
-        *inside = (struct frame){.doc = element->doc, .unit = 1};
-        if (!read_asset(ld, xmlDocGetRootElement(element->doc), inside))
-            return false;
+    if (element != NULL) {
+        *inside = home_of(ld, element, outside);
+        if (strncmp((const char *)element->parent->name, "library_", 8) == 0)
+            read_asset(ld, element->parent, inside);
+        read_asset(ld, element, inside);
     }
-    bool is_in_library = strncmp((const char *)element->parent->name, "library_", 8) == 0;
-    if ((is_in_library && !read_asset(ld, element->parent, inside)) ||
-        !read_asset(ld, element, inside))
-        return false;
-    *change = change_axes(inside->up, outside->up, inside->unit / outside->unit);
-    return true;
+    return change_axes(inside->up, outside->up, inside->unit / outside->unit);
 }
 
-static bool read_matrix(struct loader *ld, const xmlNode *n, mat4 *out)
+static mat4 make_lookat(struct loader *ld, const xmlNode *n, const double *v)
 {
-    double v[16];
-    bool ok = ld->dialect == DIALECT_CGL ? text_read_up_to(ld, n, v, 16)
-                                         : text_read_exactly(ld, n, v, 16);
-    if (ok)
-        memcpy(out->m, v, sizeof v);
-    if (ok && ld->dialect == DIALECT_COLLADA && !mat4_is_affine(out))
-        return fail_at(ld, n, "the last row of the <matrix> is not 0 0 0 1");
-    return ok;
-}
-
-static bool read_lookat(struct loader *ld, const xmlNode *n, mat4 *out)
-{
-    double v[9];
-    if (!text_read_exactly(ld, n, v, 9))
-        return false;
     dvec3 eye = d3(v[0], v[1], v[2]), up = d3(v[6], v[7], v[8]);
     dvec3 backward = d3_sub(eye, d3(v[3], v[4], v[5]));
     bool ok = d3_normalize(&backward) && d3_normalize(&up);
     dvec3 right = d3_cross(up, backward);
     if (!ok || !(d3_length(right) > 1e-9) || !d3_normalize(&right))
-        return fail_at(ld, n, "<lookat>: no direction, or up along it");
-    *out = mat4_columns(right, d3_cross(backward, right), backward, eye);
-    return true;
+        fail_at(ld, n, "<lookat>: no direction, or up along it");
+    return mat4_columns(right, d3_cross(backward, right), backward, eye);
 }
 
 /* Points move along the second axis by the tangent of the angle times how far they are along the
  * first. */
-static bool read_skew(struct loader *ld, const xmlNode *n, mat4 *out)
+static mat4 make_skew(struct loader *ld, const xmlNode *n, const double *v)
 {
-    double v[7];
-    if (!text_read_exactly(ld, n, v, 7))
-        return false;
     dvec3 from = d3(v[1], v[2], v[3]), along = d3(v[4], v[5], v[6]);
     if (!d3_normalize(&from) || !d3_normalize(&along))
-        return fail_at(ld, n, "<skew> by an axis of no length");
-    along = d3_scale(along, tan(v[0] * (3.14159265358979323846 / 180)));
-    const mat4 shift = mat4_columns(d3_scale(along, from.x), d3_scale(along, from.y),
-                                    d3_scale(along, from.z), d3(0, 0, 0));
+        fail_at(ld, n, "<skew> by an axis of no length");
+    along = d3_scale(along, tan(v[0] * DEGREE));
+    mat4 m = mat4_columns(d3_scale(along, from.x), d3_scale(along, from.y), d3_scale(along, from.z),
+                          d3(0, 0, 0));
     for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++)
-            out->m[i][j] += shift.m[i][j];
-    return true;
+        m.m[i][i] += 1;
+    return m;
+}
+
+static mat4 make_rotate(struct loader *ld, const xmlNode *n, const double *v)
+{
+    dvec3 axis = d3(v[0], v[1], v[2]);
+    if (!d3_normalize(&axis))
+        fail_at(ld, n, "<rotate> about an axis of no length");
+    return mat4_rotate(axis, v[3] * DEGREE);
+}
+
+static mat4 make_matrix(struct loader *ld, const xmlNode *n, const double *v)
+{
+    mat4 m;
+    memcpy(m.m, v, sizeof m.m);
+    if (ld->dialect == DIALECT_COLLADA && !mat4_is_affine(&m))
+        fail_at(ld, n, "the last row of the <matrix> is not 0 0 0 1");
+    return m;
 }
 
 /* The element's matrix, which is the identity for what is no transform. */
-static bool read_transform(struct loader *ld, const xmlNode *n, mat4 *out)
+static mat4 read_transform(struct loader *ld, const xmlNode *n)
 {
-    double v[4];
-    *out = mat4_identity();
-    if (element_is(n, "matrix"))
-        return read_matrix(ld, n, out);
-    if (element_is(n, "lookat"))
-        return read_lookat(ld, n, out);
-    if (element_is(n, "skew"))
-        return read_skew(ld, n, out);
-    if (element_is(n, "translate")) {
-        if (!text_read_exactly(ld, n, v, 3))
-            return false;
-        *out = mat4_translate(d3(v[0], v[1], v[2]));
-        return true;
+    enum { LOOKAT, MATRIX, ROTATE, SCALE, SKEW, TRANSLATE };
+    static const size_t COUNT[] = {9, 16, 4, 3, 7, 3}; /* of numbers */
+    int kind =
+        element_place_among((const char *)n->name, "lookat matrix rotate scale skew translate");
+    double v[16];
+    if (kind == MATRIX && ld->dialect == DIALECT_CGL)
+        text_read_up_to(ld, n, v, 16);
+    else if (kind >= 0)
+        text_read_exactly(ld, n, v, COUNT[kind]);
+    switch (ld->failed ? -1 : kind) {
+    case LOOKAT: return make_lookat(ld, n, v);
+    case MATRIX: return make_matrix(ld, n, v);
+    case ROTATE: return make_rotate(ld, n, v);
+    case SCALE: return mat4_scale(d3(v[0], v[1], v[2]));
+    case SKEW: return make_skew(ld, n, v);
+    case TRANSLATE: return mat4_translate(d3(v[0], v[1], v[2]));
+    default: return mat4_identity();
     }
-    if (element_is(n, "scale")) {
-        if (!text_read_exactly(ld, n, v, 3))
-            return false;
-        *out = mat4_scale(d3(v[0], v[1], v[2]));
-        return true;
-    }
-    if (element_is(n, "rotate")) {
-        if (!text_read_exactly(ld, n, v, 4))
-            return false;
-        dvec3 axis = d3(v[0], v[1], v[2]);
-        if (!d3_normalize(&axis))
-            return fail_at(ld, n, "<rotate> about an axis of no length");
-        *out = mat4_rotate(axis, v[3] * (3.14159265358979323846 / 180));
-        return true;
-    }
-    return true;
 }
 
 static const char *name_of(const xmlNode *node)
@@ -189,119 +162,111 @@ static const char *name_of(const xmlNode *node)
     return name != NULL ? name : id != NULL ? id : "node";
 }
 
-static bool instance_geometry(struct loader *ld, const xmlNode *instance, const struct place *at)
+/* The triangles of a mesh's group through a transform. */
+static void add_group(struct loader *ld, const xmlNode *instance, const struct mesh *mesh,
+                      const struct mesh_group *group, const mat4 *to_world, const char *name)
 {
-    const xmlNode *geometry;
-    const struct mesh *mesh;
-    struct frame inside;
-    mat4 change;
-    double sign;
-    uint32_t material;
     size_t set;
-    const char *name = name_of(at->node);
-    if (!reference_follow(ld, instance, "url", "geometry", &geometry) ||
-        !enter(ld, geometry, &at->frame, &inside, &change) || !geometry_get(ld, geometry, &mesh))
-        return false;
-    const mat4 to_world = mat4_mul(&at->to_world, &change);
-    if (!build_transform_sign(ld, instance, &to_world, &sign))
-        return false;
-    if (mesh->is_sphere)
-        return material_get(ld, instance, geometry, NULL, NULL, &material, &set) &&
-               (material == NO_SURFACE ||
-                (build_begin_object(ld, name, NULL, material, false) &&
-                 build_add_sphere(ld, instance, &to_world, mesh->radius, mesh->normal_out)));
-    for (size_t g = 0; g < mesh->num_groups; g++) {
-        const struct mesh_group *group = &mesh->groups[g];
-        const char *suffix = mesh->num_groups > 1 ? group->symbol : NULL;
-        if (!material_get(ld, instance, group->node, group->symbol, group, &material, &set))
-            return false;
-        if (material == NO_SURFACE)
-            continue;
-        if (!build_begin_object(ld, name, suffix, material, false))
-            return false;
-        const bool uses_uv = material_has_map(&ld->scene.materials[material]);
-        for (size_t t = group->first; t < group->first + group->count; t++) {
-            const struct corner *c = mesh->corners + 3 * t;
-            struct uv uv[3];
-            for (int k = 0; uses_uv && k < 3; k++)
-                uv[k] = mesh->uv[c[k].uv + set];
-            if (!build_add_triangle(ld, instance, &to_world, sign, c, uses_uv ? uv : NULL))
-                return false;
-        }
+    double sign = build_transform_sign(ld, instance, to_world);
+    uint32_t material = material_get(ld, instance, group->node, group->symbol, group, &set);
+    if (material == NO_SURFACE)
+        return;
+    build_begin_object(ld, name, mesh->num_groups > 1 ? group->symbol : NULL, material, false);
+    const bool uses_uv = !ld->failed && material_has_map(&ld->scene.materials[material]);
+    for (size_t t = group->first; t < group->first + group->count && !ld->failed; t++) {
+        const struct corner *c = mesh->corners + 3 * t;
+        struct uv uv[3];
+        for (int k = 0; uses_uv && k < 3; k++)
+            uv[k] = mesh->uv[c[k].uv + set];
+        build_add_triangle(ld, instance, to_world, sign, c, uses_uv ? uv : NULL);
     }
-    return true;
 }
 
-static bool walk(struct loader *ld, const xmlNode *node, const struct place *above);
-
-static bool instance_node(struct loader *ld, const xmlNode *instance, const struct place *at)
+static void instance_geometry(struct loader *ld, const xmlNode *instance, const struct place *at)
 {
-    const xmlNode *node;
-    if (!element_only_children(ld, instance, "extra") ||
-        !reference_follow(ld, instance, "url", "node", &node))
-        return false;
+    size_t set;
+    struct frame inside;
+    const char *name = name_of(at->node);
+    const xmlNode *geometry = reference_follow(ld, instance, "url", "geometry");
+    const mat4 change = enter(ld, geometry, &at->frame, &inside),
+               to_world = mat4_mul(&at->to_world, &change);
+    const struct mesh *mesh = geometry_get(ld, geometry);
+    if (ld->failed)
+        return;
+    if (mesh->is_sphere) {
+        build_transform_sign(ld, instance, &to_world);
+        uint32_t material = material_get(ld, instance, geometry, NULL, NULL, &set);
+        if (material == NO_SURFACE)
+            return;
+        build_begin_object(ld, name, NULL, material, false);
+        build_add_sphere(ld, instance, &to_world, mesh->radius, mesh->normal_out);
+    }
+    for (size_t g = 0; g < mesh->num_groups && !ld->failed; g++)
+        add_group(ld, instance, mesh, &mesh->groups[g], &to_world, name);
+}
+
+static void walk(struct loader *ld, const xmlNode *node, const struct place *above);
+
+static void instance_node(struct loader *ld, const xmlNode *instance, const struct place *at)
+{
+    element_check(ld, instance, "extra*");
+    const xmlNode *node = reference_follow(ld, instance, "url", "node");
     for (const struct place *p = at; p != NULL; p = p->above)
         if (p->node == node)
-            return fail_at(ld, instance, "<instance_node>: '%.60s' contains itself",
-                           element_attribute(instance, "url"));
-    return walk(ld, node, at);
+            fail_at(ld, instance, "<instance_node>: '%.60s' contains itself",
+                    element_attribute(instance, "url"));
+    if (!ld->failed)
+        walk(ld, node, at);
 }
 
-static bool read_content(struct loader *ld, const xmlNode *c, const struct place *at)
+/* <instance_light> or <instance_camera>. */
+static void instance_eye_or_lamp(struct loader *ld, const xmlNode *c, const struct place *at)
 {
-    const xmlNode *target;
-    struct frame inside;
-    mat4 change;
-    if (element_is(c, "node"))
-        return walk(ld, c, at);
-    if (element_is(c, "instance_node"))
-        return instance_node(ld, c, at);
-    if (element_is(c, "instance_geometry"))
-        return instance_geometry(ld, c, at);
     bool is_light = element_is(c, "instance_light");
-    if (is_light || element_is(c, "instance_camera")) {
-        if (!reference_follow(ld, c, "url", is_light ? "light" : "camera", &target) ||
-            !enter(ld, target, &at->frame, &inside, &change))
-            return false;
-        ld->unit = inside.unit;
-        if (is_light)
-            return light_instance(ld, c, target, name_of(at->node), &at->to_world);
-        /* A camera's own axes turn it as they would turn what it sees. */
-        struct frame home = target->doc == at->frame.doc ? at->frame : (struct frame){.unit = 1};
-        if (target->doc != at->frame.doc &&
-            !read_asset(ld, xmlDocGetRootElement(target->doc), &home))
-            return false;
-        change = change_axes(home.up, inside.up, 1);
-        const mat4 to_world = mat4_mul(&at->to_world, &change);
-        return camera_instance(ld, c, target, name_of(at->node), &to_world);
+    struct frame inside;
+    const xmlNode *target = reference_follow(ld, c, "url", is_light ? "light" : "camera");
+    enter(ld, target, &at->frame, &inside);
+    if (ld->failed)
+        return;
+    ld->unit = inside.unit;
+    if (is_light) {
+        light_instance(ld, c, target, name_of(at->node), &at->to_world);
+        return;
     }
-    if (element_is_one_of(c, "matrix lookat translate rotate scale skew asset extra"))
-        return true;
-    if (element_is(c, "instance_controller"))
-        return fail_at(ld, c, "<instance_controller>: skins and morphs are not supported");
-    return element_fail_unexpected(ld, c);
+    /* A camera's own axes turn it as they would turn what it sees. */
+    const struct frame home = home_of(ld, target, &at->frame);
+    const mat4 change = change_axes(home.up, inside.up, 1),
+               to_world = mat4_mul(&at->to_world, &change);
+    camera_instance(ld, c, target, name_of(at->node), &to_world);
 }
 
-static bool walk(struct loader *ld, const xmlNode *node, const struct place *above)
+static void walk(struct loader *ld, const xmlNode *node, const struct place *above)
 {
     struct place at = {.above = above, .node = node, .depth = above->depth + 1};
-    mat4 m;
     if (at.depth > MAX_NODE_DEPTH)
-        return fail_at(ld, node, "nodes nested deeper than %d", MAX_NODE_DEPTH);
+        fail_at(ld, node, "nodes nested deeper than %d", MAX_NODE_DEPTH);
     if (ld->num_nodes++ >= MAX_NODES)
-        return fail_at(ld, node, "more than %d instances of nodes", MAX_NODES);
-    if (!enter(ld, node, &above->frame, &at.frame, &m))
-        return false;
+        fail_at(ld, node, "more than %d instances of nodes", MAX_NODES);
+    element_check(ld, node,
+                  "asset? lookat* matrix* rotate* scale* skew* translate* instance_camera* "
+                  "instance_geometry* instance_light* instance_node* node* extra*");
+    mat4 m = enter(ld, node, &above->frame, &at.frame);
     at.to_world = mat4_mul(&above->to_world, &m);
     for (const xmlNode *c = element_first_child(node); c != NULL; c = element_next_sibling(c)) {
-        if (!read_transform(ld, c, &m))
-            return false;
+        m = read_transform(ld, c);
         at.to_world = mat4_mul(&at.to_world, &m);
     }
-    for (const xmlNode *c = element_first_child(node); c != NULL; c = element_next_sibling(c))
-        if (!read_content(ld, c, &at))
-            return false;
-    return true;
+    for (const xmlNode *c = element_first_child(node); c != NULL && !ld->failed;
+         c = element_next_sibling(c)) {
+        if (element_is(c, "node"))
+            walk(ld, c, &at);
+        else if (element_is(c, "instance_node"))
+            instance_node(ld, c, &at);
+        else if (element_is(c, "instance_geometry"))
+            instance_geometry(ld, c, &at);
+        else if (element_is_one_of(c, "instance_light instance_camera"))
+            instance_eye_or_lamp(ld, c, &at);
+    }
 }
 
 /* Adds a sentence to the scene's note. */
@@ -345,95 +310,84 @@ static void write_notes(struct loader *ld)
 
 /* What moves is counted, as a still image shows where it stands; other libraries may only be empty,
  * as exporters leave them. */
-static bool check_libraries(struct loader *ld, const xmlNode *root)
+static void check_libraries(struct loader *ld, const xmlNode *root)
 {
-    static const char MOVING[] =
-        "library_animations library_animation_clips library_controllers library_formulas "
-        "library_force_fields library_physics_materials library_physics_models "
-        "library_physics_scenes library_joints library_kinematics_models "
-        "library_kinematics_scenes library_articulated_systems";
     for (const xmlNode *c = element_first_child(root); c != NULL; c = element_next_sibling(c)) {
+        bool moves = element_is_one_of(
+            c, "library_animations library_animation_clips library_controllers library_formulas "
+               "library_force_fields library_physics_materials library_physics_models "
+               "library_physics_scenes library_joints library_kinematics_models "
+               "library_kinematics_scenes library_articulated_systems");
         if (element_is_one_of(c,
                               "asset scene extra library_cameras library_lights library_images "
                               "library_effects library_materials library_geometries library_nodes "
                               "library_visual_scenes"))
             continue;
         if (strncmp((const char *)c->name, "library_", 8) != 0)
-            return element_fail_unexpected(ld, c);
-        for (const xmlNode *item = element_first_child(c); item != NULL;
-             item = element_next_sibling(item))
-            if (element_is_one_of(item, "asset extra"))
-                continue;
-            else if (element_is_one_of(c, MOVING))
-                ld->num_left_out[LEFT_OUT_MOVING]++;
-            else
-                return fail_at(ld, item, "<%.60s> in <%.60s> is not supported",
-                               (const char *)item->name, (const char *)c->name);
+            element_fail_unexpected(ld, c);
+        if (!moves)
+            element_check(ld, c, "asset? extra*");
+        for (const xmlNode *i = element_first_child(c); i != NULL; i = element_next_sibling(i))
+            ld->num_left_out[LEFT_OUT_MOVING] += !element_is_one_of(i, "asset extra");
     }
-    return true;
 }
 
 /* Of a file that shows none: its only one, NULL if there is none. */
-static bool find_only_visual_scene(struct loader *ld, const xmlNode *root, const xmlNode **out)
+static const xmlNode *find_only_visual_scene(struct loader *ld, const xmlNode *root)
 {
-    *out = NULL;
-    for (const xmlNode *c = element_first_child(root); c != NULL; c = element_next_sibling(c))
-        for (const xmlNode *v = element_is(c, "library_visual_scenes") ? element_first_child(c)
-                                                                       : NULL;
-             v != NULL; v = element_next_sibling(v)) {
+    const xmlNode *only = NULL;
+    for (const xmlNode *c = element_first_child(root); c != NULL; c = element_next_sibling(c)) {
+        const xmlNode *v = element_is(c, "library_visual_scenes") ? element_first_child(c) : NULL;
+        for (; v != NULL; v = element_next_sibling(v)) {
             if (!element_is(v, "visual_scene"))
                 continue;
-            if (*out != NULL)
-                return fail_at(ld, root, "no <scene>, and more than one <visual_scene>");
-            *out = v;
+            if (only != NULL)
+                fail_at(ld, root, "no <scene>, and more than one <visual_scene>");
+            only = v;
         }
-    return true;
+    }
+    return only;
 }
 
-static bool find_visual_scene(struct loader *ld, const xmlNode *root, const xmlNode **out)
+static const xmlNode *find_visual_scene(struct loader *ld, const xmlNode *root)
 {
-    xmlNode *scene, *instance;
-    if (!element_one_child(ld, root, "scene", &scene))
-        return false;
+    element_check(ld, root, "scene? *");
+    const xmlNode *scene = element_child(root, "scene"),
+                  *instance = element_child(scene, "instance_visual_scene");
     if (scene == NULL)
-        return find_only_visual_scene(ld, root, out);
-    if (!element_only_children(ld, scene,
-                               "instance_visual_scene instance_physics_scene "
-                               "instance_kinematics_scene extra") ||
-        !element_one_child(ld, scene, "instance_visual_scene", &instance))
-        return false;
-    if (instance == NULL)
-        return fail_at(ld, scene, "<scene> without <instance_visual_scene>");
-    return element_only_children(ld, instance, "extra") &&
-           reference_follow(ld, instance, "url", "visual_scene", out);
+        return find_only_visual_scene(ld, root);
+    element_check(ld, scene,
+                  "instance_visual_scene instance_physics_scene* instance_kinematics_scene? "
+                  "extra*");
+    element_check(ld, instance, "extra*");
+    return reference_follow(ld, instance, "url", "visual_scene");
 }
 
 static bool read_scene(struct loader *ld, const xmlNode *root)
 {
-    const xmlNode *visual;
     const struct frame world = {.unit = 1};
     struct place top = {.depth = 0};
-    if (!check_libraries(ld, root) || !find_visual_scene(ld, root, &visual))
-        return false;
-    if (visual != NULL && (!element_only_children(ld, visual, "asset node extra") ||
-                           !enter(ld, visual, &world, &top.frame, &top.to_world)))
-        return false;
+    check_libraries(ld, root);
+    const xmlNode *visual = find_visual_scene(ld, root);
+    element_check(ld, visual, "asset? node* extra*");
+    top.to_world = enter(ld, visual, &world, &top.frame);
     /* Other documents than those of Y_UP are turned, too, as the assignment turns them. */
     if (top.frame.up != 0)
         for (int j = 0; j < 3; j++) {
             top.to_world.m[0][j] = -top.to_world.m[0][j];
             top.to_world.m[2][j] = -top.to_world.m[2][j];
         }
-    for (const xmlNode *c = visual != NULL ? element_first_child(visual) : NULL; c != NULL;
+    for (const xmlNode *c = element_first_child(visual); c != NULL && !ld->failed;
          c = element_next_sibling(c))
-        if (element_is(c, "node") && !walk(ld, c, &top))
-            return false;
-    if (!light_finish(ld))
+        if (element_is(c, "node"))
+            walk(ld, c, &top);
+    light_finish(ld);
+    if (ld->failed)
         return false;
     if (scene_num_primitives(&ld->scene) == 0)
         add_note(ld, visual == NULL ? "nothing to see: no <scene>"
                                     : "nothing to see: no triangles, no spheres");
-    else if (element_child_named(root, "scene") == NULL)
+    else if (element_child(root, "scene") == NULL)
         add_note(ld, "no <scene>: the only <visual_scene> is shown");
     ld->scene.dialect = ld->dialect;
     write_notes(ld);
@@ -472,9 +426,8 @@ static bool load(struct text_input *in, const char *path, enum dialect dialect, 
                  struct err *e)
 {
     struct loader ld = {.path = path, .err = e, .dialect = dialect};
-    struct document *d;
-    bool ok = xml_open(&ld, path, in, &d) && read_scene(&ld, xmlDocGetRootElement(d->doc)) &&
-              name_documents(&ld);
+    const struct document *d = xml_open(&ld, path, in);
+    bool ok = d != NULL && read_scene(&ld, xmlDocGetRootElement(d->doc)) && name_documents(&ld);
     if (ok)
         *out = ld.scene;
     else
@@ -483,7 +436,7 @@ static bool load(struct text_input *in, const char *path, enum dialect dialect, 
         mesh_release(&ld.meshes[i]);
     for (size_t i = 0; i < ld.num_documents; i++) {
         xmlFreeDoc(ld.documents[i]->doc);
-        free(ld.documents[i]->ids);
+        xmlHashFree(ld.documents[i]->ids, NULL);
         free(ld.documents[i]->path);
         free(ld.documents[i]);
     }

@@ -7,17 +7,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-void *build_grow(struct loader *ld, void *data, size_t size, size_t count, size_t *capacity)
+/* Room for 8, then for the next power of two. */
+void *build_grow(struct loader *ld, void *data, size_t size, size_t count)
 {
-    if (count < *capacity)
+    if (ld->failed || (count != 0 && (count < 8 || (count & (count - 1)) != 0)))
         return data;
-    size_t more = *capacity < 8 ? 8 : 2 * *capacity;
+    size_t more = count < 8 ? 8 : 2 * count;
     void *p = more <= SIZE_MAX / size ? realloc(data, more * size) : NULL;
     if (p == NULL)
         fail_memory(ld);
-    else
-        *capacity = more;
-    return p;
+    return p != NULL ? p : data;
 }
 
 void build_copy_name(char *out, size_t size, const char *name)
@@ -35,84 +34,40 @@ void build_copy_name(char *out, size_t size, const char *name)
             out[i] = '_';
 }
 
-bool build_add_material(struct loader *ld, const struct material *m, uint32_t *index)
+uint32_t build_add_material(struct loader *ld, const struct material *m)
 {
     struct scene *s = &ld->scene;
-    struct material *p =
-        build_grow(ld, s->materials, sizeof *p, s->num_materials, &ld->cap_materials);
-    if (p == NULL)
-        return false;
-    s->materials = p;
-    *index = s->num_materials;
-    p[s->num_materials++] = *m;
-    return true;
+    s->materials = build_grow(ld, s->materials, sizeof *s->materials, s->num_materials);
+    if (ld->failed)
+        return 0;
+    s->materials[s->num_materials] = *m;
+    return s->num_materials++;
 }
 
-bool build_add_light(struct loader *ld, const struct light *l)
+void build_add_light(struct loader *ld, const struct light *l)
 {
     struct scene *s = &ld->scene;
-    struct light *p = build_grow(ld, s->lights, sizeof *p, s->num_lights, &ld->cap_lights);
-    if (p == NULL)
-        return false;
-    s->lights = p;
-    p[s->num_lights++] = *l;
-    return true;
+    s->lights = build_grow(ld, s->lights, sizeof *s->lights, s->num_lights);
+    if (!ld->failed)
+        s->lights[s->num_lights++] = *l;
 }
 
-bool build_begin_object(struct loader *ld, const char *name, const char *symbol, uint32_t material,
+void build_begin_object(struct loader *ld, const char *name, const char *symbol, uint32_t material,
                         bool is_lamp)
 {
     struct scene *s = &ld->scene;
-    size_t capacity = ld->cap_objects;
-    struct object *o = build_grow(ld, s->objects, sizeof *o, s->num_objects, &capacity);
-    if (o == NULL)
-        return false;
-    s->objects = o;
-    bool *lamps = build_grow(ld, ld->is_lamp, sizeof *lamps, s->num_objects, &ld->cap_objects);
-    if (lamps == NULL)
-        return false;
-    ld->is_lamp = lamps;
-    lamps[s->num_objects] = is_lamp;
-    o = &o[s->num_objects++];
+    char full[512];
+    s->objects = build_grow(ld, s->objects, sizeof *s->objects, s->num_objects);
+    ld->is_lamp = build_grow(ld, ld->is_lamp, sizeof *ld->is_lamp, s->num_objects);
+    if (ld->failed)
+        return;
+    ld->is_lamp[s->num_objects] = is_lamp;
+    struct object *o = &s->objects[s->num_objects++];
     *o = (struct object){
         .first_triangle = s->num_triangles, .first_sphere = s->num_spheres, .material = material};
-    char full[512];
     snprintf(full, sizeof full, "%.255s%s%.255s", name, symbol != NULL ? ":" : "",
              symbol != NULL ? symbol : "");
     build_copy_name(o->name, sizeof o->name, full);
-    return true;
-}
-
-static bool reserve_triangle(struct loader *ld)
-{
-    struct scene *s = &ld->scene;
-    size_t count = s->num_triangles, cap[5];
-    for (int i = 0; i < 5; i++)
-        cap[i] = ld->cap_triangles;
-    vec3 *p = build_grow(ld, s->position, 3 * sizeof *p, count, &cap[0]);
-    if (p == NULL)
-        return false;
-    s->position = p;
-    p = build_grow(ld, s->normal, 3 * sizeof *p, count, &cap[1]);
-    if (p == NULL)
-        return false;
-    s->normal = p;
-    uint32_t *id = build_grow(ld, s->tri_material, sizeof *id, count, &cap[2]);
-    if (id == NULL)
-        return false;
-    s->tri_material = id;
-    id = build_grow(ld, s->tri_object, sizeof *id, count, &cap[3]);
-    if (id == NULL)
-        return false;
-    s->tri_object = id;
-    if (ld->has_textures) {
-        struct uv *uv = build_grow(ld, s->uv, 3 * sizeof *uv, count, &cap[4]);
-        if (uv == NULL)
-            return false;
-        s->uv = uv;
-    }
-    ld->cap_triangles = cap[0];
-    return true;
 }
 
 vec3 build_to_float(dvec3 v)
@@ -120,29 +75,34 @@ vec3 build_to_float(dvec3 v)
     return v3((float)v.x, (float)v.y, (float)v.z);
 }
 
-static bool to_world(struct loader *ld, const xmlNode *n, const mat4 *m, dvec3 p, vec3 *out)
+vec3 build_place(struct loader *ld, const xmlNode *n, const char *what, const mat4 *m, dvec3 p)
 {
     dvec3 w = mat4_point(m, p);
     if (!(fabs(w.x) <= FARTHEST && fabs(w.y) <= FARTHEST && fabs(w.z) <= FARTHEST))
-        return fail_at(ld, n, "a coordinate is beyond %g or not a number", FARTHEST);
-    *out = v3((float)w.x, (float)w.y, (float)w.z);
-    return true;
+        fail_at(ld, n, "%s is beyond %g or not a number", what, FARTHEST);
+    return build_to_float(w);
 }
 
-bool build_transform_sign(struct loader *ld, const xmlNode *n, const mat4 *m, double *sign)
+vec3 build_direction(struct loader *ld, const xmlNode *n, const char *what, dvec3 v)
 {
-    if (!mat4_is_affine(m))
-        return fail_at(ld, n, "the last row of a matrix above is not 0 0 0 1");
+    if (!d3_normalize(&v))
+        fail_at(ld, n, "%s has no direction", what);
+    return build_to_float(v);
+}
+
+double build_transform_sign(struct loader *ld, const xmlNode *n, const mat4 *m)
+{
     double det = mat4_det3(m);
     double size =
         d3_length(mat4_column(m, 0)) * d3_length(mat4_column(m, 1)) * d3_length(mat4_column(m, 2));
+    if (!mat4_is_affine(m))
+        fail_at(ld, n, "the last row of a matrix above is not 0 0 0 1");
     if (!(fabs(det) > 1e-9 * size) || !isfinite(det))
-        return fail_at(ld, n, "the transforms above are singular");
-    *sign = det < 0 ? -1 : 1;
-    return true;
+        fail_at(ld, n, "the transforms above are singular");
+    return det < 0 ? -1 : 1;
 }
 
-bool build_add_triangle(struct loader *ld, const xmlNode *n, const mat4 *m, double sign,
+void build_add_triangle(struct loader *ld, const xmlNode *n, const mat4 *m, double sign,
                         const struct corner c[3], const struct uv uv[3])
 {
     struct scene *s = &ld->scene;
@@ -151,39 +111,44 @@ bool build_add_triangle(struct loader *ld, const xmlNode *n, const mat4 *m, doub
     const struct corner *in[3] = {&c[0], &c[order[1]], &c[order[2]]};
     vec3 p[3], normal[3];
     for (int k = 0; k < 3; k++)
-        if (!to_world(ld, n, m, in[k]->position, &p[k]))
-            return false;
+        p[k] = build_place(ld, n, "a coordinate", m, in[k]->position);
     vec3 ng = cross(sub(p[1], p[0]), sub(p[2], p[0]));
     if (!(dot(ng, ng) >= FLT_MIN)) {
         s->num_degenerate++;
-        return true;
+        return;
     }
     ng = normalize(ng);
     vec3 sum = v3(0, 0, 0);
     for (int k = 0; k < 3; k++) {
         const float *f = in[k]->normal;
         dvec3 w = d3_scale(mat4_cofactor(m, d3(f[0], f[1], f[2])), sign);
-        normal[k] = d3_normalize(&w) ? v3((float)w.x, (float)w.y, (float)w.z) : ng;
+        normal[k] = d3_normalize(&w) ? build_to_float(w) : ng;
         sum = add(sum, normal[k]);
     }
     if (dot(sum, ng) < 0)
         for (int k = 0; k < 3; k++)
             normal[k] = neg(normal[k]);
-    if (s->num_triangles >= MAX_TRIANGLES)
-        return fail_at(ld, n, "more than %d triangles", MAX_TRIANGLES);
-    if (!reserve_triangle(ld))
-        return false;
+    const size_t i = s->num_triangles;
+    if (i >= MAX_TRIANGLES)
+        fail_at(ld, n, "more than %d triangles", MAX_TRIANGLES);
+    s->position = build_grow(ld, s->position, sizeof p, i);
+    s->normal = build_grow(ld, s->normal, sizeof normal, i);
+    s->tri_material = build_grow(ld, s->tri_material, sizeof *s->tri_material, i);
+    s->tri_object = build_grow(ld, s->tri_object, sizeof *s->tri_object, i);
+    if (ld->has_textures)
+        s->uv = build_grow(ld, s->uv, 3 * sizeof *s->uv, i);
+    if (ld->failed)
+        return;
     assert(s->num_objects > 0);
     struct object *o = &s->objects[s->num_objects - 1];
-    uint32_t i = s->num_triangles++;
-    memcpy(s->position + 3 * (size_t)i, p, sizeof p);
-    memcpy(s->normal + 3 * (size_t)i, normal, sizeof normal);
+    memcpy(s->position + 3 * i, p, sizeof p);
+    memcpy(s->normal + 3 * i, normal, sizeof normal);
     for (size_t k = 0; ld->has_textures && k < 3; k++)
-        s->uv[3 * (size_t)i + k] = uv != NULL ? uv[order[k]] : (struct uv){0, 0};
+        s->uv[3 * i + k] = uv != NULL ? uv[order[k]] : (struct uv){0, 0};
     s->tri_material[i] = o->material;
     s->tri_object[i] = s->num_objects - 1;
+    s->num_triangles++;
     o->num_triangles++;
-    return true;
 }
 
 /* The one factor by which m scales all lengths; 0 if there is none. */
@@ -198,39 +163,30 @@ static double uniform_scale(const mat4 *m)
     return sqrt(s2);
 }
 
-bool build_add_sphere(struct loader *ld, const xmlNode *n, const mat4 *m, double radius,
+void build_add_sphere(struct loader *ld, const xmlNode *n, const mat4 *m, double radius,
                       float normal_out)
 {
     struct scene *s = &ld->scene;
+    const uint32_t i = s->num_spheres;
     double factor = uniform_scale(m);
     if (factor == 0)
-        return fail_at(ld, n, "a sphere under a scale that is not uniform is not supported");
+        fail_at(ld, n, "a sphere under a scale that is not uniform is not supported");
     if (!(radius * factor <= FARTHEST && radius * factor >= 1e-18))
-        return fail_at(ld, n, "the sphere's radius of %g is out of range", radius * factor);
-    struct sphere sphere = {.radius = (float)(radius * factor), .normal_out = normal_out};
-    if (!to_world(ld, n, m, d3(0, 0, 0), &sphere.centre))
-        return false;
-    size_t cap[3] = {ld->cap_spheres, ld->cap_spheres, ld->cap_spheres};
-    struct sphere *p = build_grow(ld, s->spheres, sizeof *p, s->num_spheres, &cap[0]);
-    if (p == NULL)
-        return false;
-    s->spheres = p;
-    uint32_t *id = build_grow(ld, s->sphere_material, sizeof *id, s->num_spheres, &cap[1]);
-    if (id == NULL)
-        return false;
-    s->sphere_material = id;
-    id = build_grow(ld, s->sphere_object, sizeof *id, s->num_spheres, &cap[2]);
-    if (id == NULL)
-        return false;
-    s->sphere_object = id;
-    ld->cap_spheres = cap[0];
+        fail_at(ld, n, "the sphere's radius of %g is out of range", radius * factor);
+    vec3 centre = build_place(ld, n, "a coordinate", m, d3(0, 0, 0));
+    s->spheres = build_grow(ld, s->spheres, sizeof *s->spheres, i);
+    s->sphere_material = build_grow(ld, s->sphere_material, sizeof *s->sphere_material, i);
+    s->sphere_object = build_grow(ld, s->sphere_object, sizeof *s->sphere_object, i);
+    if (ld->failed)
+        return;
     assert(s->num_objects > 0);
     struct object *o = &s->objects[s->num_objects - 1];
-    s->spheres[s->num_spheres] = sphere;
-    s->sphere_material[s->num_spheres] = o->material;
-    s->sphere_object[s->num_spheres++] = s->num_objects - 1;
+    s->spheres[i] = (struct sphere){
+        .centre = centre, .radius = (float)(radius * factor), .normal_out = normal_out};
+    s->sphere_material[i] = o->material;
+    s->sphere_object[i] = s->num_objects - 1;
+    s->num_spheres++;
     o->num_spheres++;
-    return true;
 }
 
 bool build_find_bounds(const struct loader *ld, bool with_lamps, vec3 *lo, vec3 *hi)
@@ -286,32 +242,35 @@ static bool are_twins(const struct scene *s, const struct object *lamp, const st
     return true;
 }
 
+/* Takes `gone` elements from the middle of an array of `count`. */
+static void cut_out(void *array, size_t size, size_t first, size_t gone, size_t count)
+{
+    char *at = (char *)array + first * size;
+    memmove(at, at + gone * size, (count - first - gone) * size);
+}
+
 /* Takes an object that has triangles only out of the scene. */
 static void remove_object(struct loader *ld, uint32_t i)
 {
     struct scene *s = &ld->scene;
-    const struct object o = s->objects[i];
-    size_t from = o.first_triangle + o.num_triangles, tail = s->num_triangles - from;
-    memmove(s->position + 3 * (size_t)o.first_triangle, s->position + 3 * from,
-            3 * tail * sizeof *s->position);
-    memmove(s->normal + 3 * (size_t)o.first_triangle, s->normal + 3 * from,
-            3 * tail * sizeof *s->normal);
+    const size_t first = s->objects[i].first_triangle, gone = s->objects[i].num_triangles,
+                 count = s->num_triangles;
+    cut_out(s->position, 3 * sizeof *s->position, first, gone, count);
+    cut_out(s->normal, 3 * sizeof *s->normal, first, gone, count);
     if (s->uv != NULL)
-        memmove(s->uv + 3 * (size_t)o.first_triangle, s->uv + 3 * from, 3 * tail * sizeof *s->uv);
-    memmove(s->tri_material + o.first_triangle, s->tri_material + from,
-            tail * sizeof *s->tri_material);
-    memmove(s->tri_object + o.first_triangle, s->tri_object + from, tail * sizeof *s->tri_object);
-    s->num_triangles -= o.num_triangles;
-    for (uint32_t t = o.first_triangle; t < s->num_triangles; t++)
+        cut_out(s->uv, 3 * sizeof *s->uv, first, gone, count);
+    cut_out(s->tri_material, sizeof *s->tri_material, first, gone, count);
+    cut_out(s->tri_object, sizeof *s->tri_object, first, gone, count);
+    cut_out(s->objects, sizeof *s->objects, i, 1, s->num_objects);
+    cut_out(ld->is_lamp, sizeof *ld->is_lamp, i, 1, s->num_objects);
+    s->num_triangles -= (uint32_t)gone;
+    s->num_objects--;
+    for (size_t t = first; t < s->num_triangles; t++)
         s->tri_object[t]--;
     for (uint32_t k = 0; k < s->num_spheres; k++)
-        if (s->sphere_object[k] > i)
-            s->sphere_object[k]--;
-    s->num_objects--;
-    memmove(s->objects + i, s->objects + i + 1, (s->num_objects - i) * sizeof *s->objects);
-    memmove(ld->is_lamp + i, ld->is_lamp + i + 1, (s->num_objects - i) * sizeof *ld->is_lamp);
+        s->sphere_object[k] -= s->sphere_object[k] > i;
     for (uint32_t k = i; k < s->num_objects; k++)
-        s->objects[k].first_triangle -= o.num_triangles;
+        s->objects[k].first_triangle -= (uint32_t)gone;
 }
 
 void build_drop_twin_lamps(struct loader *ld)

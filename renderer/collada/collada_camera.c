@@ -3,48 +3,43 @@
 
 static const double DEGREE = 3.14159265358979323846 / 180;
 
-static bool set_clipping(struct loader *ld, const xmlNode *n, double near, double far,
-                         struct scene_camera *c)
+/* In metres. */
+static double read_length(struct loader *ld, const xmlNode *n, const char *name)
 {
-    if (!(far > near) || !(far * ld->unit <= FARTHEST))
-        return fail_at(ld, n, "<zfar> is not beyond <znear>, or something is out of range");
-    c->near = (float)(near * ld->unit);
-    c->far = (float)(far * ld->unit);
-    return true;
+    double v = ld->unit * field_number(ld, n, name, 0, ANY_LENGTH);
+    if (v > FARTHEST)
+        fail_at(ld, n, "<%s> is out of range", name);
+    return v;
 }
 
-static bool read_orthographic(struct loader *ld, const xmlNode *n, struct scene_camera *c)
+static float read_angle(struct loader *ld, const xmlNode *n, const char *name)
 {
-    double near, far, aspect = 0, x = 0, y = 0;
-    if (!field_read_all(
-            ld, n,
-            FIELDS({FIELD_OF_LENGTH("xmag", &x, false)}, {FIELD_OF_LENGTH("ymag", &y, false)},
-                   {"aspect_ratio", FIELD_NUMBER, &aspect, .lo = 1e-6, .hi = 1e6},
-                   {FIELD_OF_LENGTH("znear", &near, true)}, {FIELD_OF_LENGTH("zfar", &far, true)})))
-        return false;
-    if (x == 0 && y == 0)
-        return fail_at(ld, n, "<orthographic> needs <xmag> or <ymag>");
-    if (fmax(x, y) * ld->unit > FARTHEST)
-        return fail_at(ld, n, "<xmag> or <ymag> is out of range");
-    c->xmag = (float)(x * ld->unit);
-    c->ymag = (float)(y * ld->unit);
-    c->aspect = (float)aspect;
-    return set_clipping(ld, n, near, far, c);
+    return (float)(field_number(ld, n, name, 0, 1e-6, 179.9999) * DEGREE);
 }
 
-static bool read_perspective(struct loader *ld, const xmlNode *n, struct scene_camera *c)
+/* <perspective> or <orthographic>. */
+static void read_kind(struct loader *ld, const xmlNode *n, struct scene_camera *c)
 {
-    double near, far, aspect = 0, x = 0, y = 0;
-    if (!field_read_all(ld, n,
-                        FIELDS({"xfov", FIELD_NUMBER, &x, .lo = 1e-6, .hi = 179.9999},
-                               {"yfov", FIELD_NUMBER, &y, .lo = 1e-6, .hi = 179.9999},
-                               {"aspect_ratio", FIELD_NUMBER, &aspect, .lo = 1e-6, .hi = 1e6},
-                               {FIELD_OF_LENGTH("znear", &near, true)},
-                               {FIELD_OF_LENGTH("zfar", &far, true)})))
-        return false;
-    c->hfov = (float)(x * DEGREE);
-    c->vfov = (float)(y * DEGREE);
+    bool is_flat = element_is(n, "orthographic");
+    element_check(ld, n,
+                  is_flat ? "xmag? ymag? aspect_ratio? znear zfar"
+                          : "xfov? yfov? aspect_ratio? znear zfar");
+    double near = read_length(ld, n, "znear"), far = read_length(ld, n, "zfar"),
+           x = read_length(ld, n, "xmag"), y = read_length(ld, n, "ymag"),
+           aspect = field_number(ld, n, "aspect_ratio", 0, 1e-6, 1e6);
+    c->near = (float)near;
+    c->far = (float)far;
+    c->xmag = (float)x;
+    c->ymag = (float)y;
     c->aspect = (float)aspect;
+    c->hfov = read_angle(ld, n, "xfov");
+    c->vfov = read_angle(ld, n, "yfov");
+    if (!(far > near))
+        fail_at(ld, n, "<zfar> is not beyond <znear>");
+    if (is_flat && x == 0 && y == 0)
+        fail_at(ld, n, "<orthographic> needs <xmag> or <ymag>");
+    if (is_flat)
+        return;
     /* Blender writes the angle of the larger side for <xfov>, unless told which is meant. */
     ld->num_left_out[LEFT_OUT_UPRIGHT] +=
         ld->blender_version > 0 && ld->dialect == DIALECT_COLLADA && aspect > 0 && aspect < 1;
@@ -52,13 +47,12 @@ static bool read_perspective(struct loader *ld, const xmlNode *n, struct scene_c
         if (c->hfov == 0)
             c->hfov = (float)(50 * DEGREE);
         if (c->vfov == 0 && c->aspect == 0)
-            return fail_at(ld, n, "<perspective> needs <yfov> or <aspect_ratio>");
+            fail_at(ld, n, "<perspective> needs <yfov> or <aspect_ratio>");
         if (c->vfov == 0)
             c->vfov = 2 * atanf(tanf(c->hfov / 2) / c->aspect);
     }
     if (c->hfov == 0 && c->vfov == 0)
-        return fail_at(ld, n, "<perspective> needs <xfov> or <yfov>");
-    return set_clipping(ld, n, near, far, c);
+        fail_at(ld, n, "<perspective> needs <xfov> or <yfov>");
 }
 
 /* The assignment looks at the scene from the direction c, with world +Y up; straight from above or
@@ -72,70 +66,50 @@ static void look_cgl(struct scene_camera *out, dvec3 c)
     out->backward = build_to_float(c);
 }
 
-static bool place(struct loader *ld, const xmlNode *n, const mat4 *m, struct scene_camera *out)
+static void place(struct loader *ld, const xmlNode *n, const mat4 *m, struct scene_camera *out)
 {
-    dvec3 eye = mat4_point(m, d3(0, 0, 0));
-    if (!(fabs(eye.x) <= FARTHEST && fabs(eye.y) <= FARTHEST && fabs(eye.z) <= FARTHEST))
-        return fail_at(ld, n, "the camera is beyond %g", FARTHEST);
-    out->eye = build_to_float(eye);
+    out->eye = build_place(ld, n, "the camera", m, d3(0, 0, 0));
     if (ld->dialect == DIALECT_CGL) {
         dvec3 c = mat4_point(m, d3(0, 0, -1));
         if (!d3_normalize(&c))
-            return fail_at(ld, n, "the camera has no direction");
+            fail_at(ld, n, "the camera has no direction");
         look_cgl(out, c);
-        return true;
+        return;
     }
-    double sign;
-    if (!build_transform_sign(ld, n, m, &sign))
-        return false;
+    double sign = build_transform_sign(ld, n, m);
     dvec3 x = mat4_column(m, 0), y = mat4_column(m, 1), z = mat4_column(m, 2);
     if (!d3_normalize(&x) || !d3_normalize(&y) || !d3_normalize(&z))
-        return fail_at(ld, n, "the transforms above are singular");
+        fail_at(ld, n, "the transforms above are singular");
     if (fabs(d3_dot(x, y)) > 1e-4 || fabs(d3_dot(y, z)) > 1e-4 || fabs(d3_dot(z, x)) > 1e-4)
-        return fail_at(ld, n, "the transforms above shear the camera");
+        fail_at(ld, n, "the transforms above shear the camera");
     if (sign < 0)
-        return fail_at(ld, n, "the transforms above mirror the camera: not supported");
+        fail_at(ld, n, "the transforms above mirror the camera: not supported");
     out->right = build_to_float(x);
     out->up = build_to_float(y);
     out->backward = build_to_float(z);
-    return true;
 }
 
-bool camera_instance(struct loader *ld, const xmlNode *instance, const xmlNode *camera,
+void camera_instance(struct loader *ld, const xmlNode *instance, const xmlNode *camera,
                      const char *node_name, const mat4 *m)
 {
-    xmlNode *optics, *common = NULL, *kind = NULL;
     struct scene *s = &ld->scene;
     struct scene_camera c = {.present = true};
-    if (!element_only_children(ld, instance, "extra") ||
-        !element_only_children(ld, camera, "asset optics imager extra") ||
-        !element_one_child(ld, camera, "optics", &optics))
-        return false;
-    if (optics != NULL && (!element_only_children(ld, optics, "technique_common technique extra") ||
-                           !element_one_child(ld, optics, "technique_common", &common)))
-        return false;
-    if (common != NULL)
-        kind = element_first_child(common);
-    if (kind == NULL)
-        return fail_at(ld, camera, "<camera> without <optics> of a kind");
-    if (element_next_sibling(kind) != NULL)
-        return element_fail_unexpected(ld, element_next_sibling(kind));
-    bool flat = element_is(kind, "orthographic") && ld->dialect == DIALECT_COLLADA;
-    if (!flat && !element_is(kind, "perspective"))
-        return element_fail_unexpected(ld, kind);
-    if (!(flat ? read_orthographic(ld, kind, &c) : read_perspective(ld, kind, &c)) ||
-        !place(ld, instance, m, &c))
-        return false;
+    element_check(ld, instance, "extra*");
+    element_check(ld, camera, "asset? optics imager? extra*");
+    const xmlNode *optics = element_child(camera, "optics");
+    element_check(ld, optics, "technique_common technique* extra*");
+    const xmlNode *common = element_child(optics, "technique_common");
+    element_check(ld, common,
+                  ld->dialect == DIALECT_CGL ? "perspective" : "perspective|orthographic");
+    read_kind(ld, element_first_child(common), &c);
+    place(ld, instance, m, &c);
     build_copy_name(c.name, sizeof c.name, node_name);
-    struct scene_camera *grown =
-        build_grow(ld, s->cameras, sizeof *grown, s->num_cameras, &ld->cap_cameras);
-    if (grown == NULL)
-        return false;
-    s->cameras = grown;
+    s->cameras = build_grow(ld, s->cameras, sizeof *s->cameras, s->num_cameras);
+    if (ld->failed)
+        return;
     if (s->num_cameras == 0 || ld->dialect == DIALECT_CGL)
         s->camera = c;
-    grown[s->num_cameras++] = c;
-    return true;
+    s->cameras[s->num_cameras++] = c;
 }
 
 void camera_default(struct loader *ld)

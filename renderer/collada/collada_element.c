@@ -3,40 +3,56 @@
 
 #include <stdarg.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
+
+static void fail(struct loader *ld, const xmlNode *n, long line, const char *fmt, va_list ap)
+{
+    char text[900];
+    if (ld->failed)
+        return;
+    ld->failed = true;
+    vsnprintf(text, sizeof text, fmt, ap);
+    const char *path = n != NULL ? element_document(n)->path : ld->path;
+    if (line > 0)
+        err_set(ld->err, "%s:%ld: %s", path, line, text);
+    else
+        err_set(ld->err, "%s: %s", path, text);
+}
 
 bool(fail_line)(struct loader *ld, const xmlNode *n, long line, const char *fmt, ...)
 {
-    char text[900];
     va_list ap;
     va_start(ap, fmt);
-    vsnprintf(text, sizeof text, fmt, ap);
+    fail(ld, n, line, fmt, ap);
     va_end(ap);
-    for (char *c = text; *c != '\0'; c++)
-        if ((unsigned char)*c < 0x20 || *c == 0x7f)
-            *c = '?';
-    return err_set(ld->err, "%s:%ld: %s", n != NULL ? element_document(n)->path : ld->path, line,
-                   text);
+    return false;
 }
 
 bool(fail_at)(struct loader *ld, const xmlNode *n, const char *fmt, ...)
 {
-    char text[900];
     va_list ap;
     va_start(ap, fmt);
-    vsnprintf(text, sizeof text, fmt, ap);
+    fail(ld, n, element_line(n), fmt, ap);
     va_end(ap);
-    return fail_line(ld, n, element_line(n), "%s", text);
+    return false;
 }
 
 bool(fail_memory)(struct loader *ld)
 {
-    return err_set(ld->err, "%s: out of memory", ld->path);
+    return fail_line(ld, NULL, 0, "out of memory");
 }
 
 bool element_fail_unexpected(struct loader *ld, const xmlNode *child)
 {
+    static const char *const UNSUPPORTED[][2] = {{"brep", "solids by their boundaries"},
+                                                 {"convex_mesh", "convex hulls"},
+                                                 {"instance_controller", "skins and morphs"},
+                                                 {"ph", "polygons with holes"},
+                                                 {"spline", "curves"}};
+    for (size_t i = 0; i < sizeof UNSUPPORTED / sizeof *UNSUPPORTED; i++)
+        if (element_is(child, UNSUPPORTED[i][0]))
+            return fail_at(ld, child, "<%s>: %s are not supported", UNSUPPORTED[i][0],
+                           UNSUPPORTED[i][1]);
     return fail_at(ld, child, "unexpected <%.60s> in <%.60s>", (const char *)child->name,
                    (const char *)child->parent->name);
 }
@@ -44,7 +60,7 @@ bool element_fail_unexpected(struct loader *ld, const xmlNode *child)
 /* The parser's own line numbers end at 65535, so element_start() keeps them in _private. */
 long element_line(const xmlNode *n)
 {
-    return (long)(intptr_t)n->_private;
+    return n != NULL ? (long)(intptr_t)n->_private : 0;
 }
 
 const struct document *element_document(const xmlNode *n)
@@ -52,76 +68,115 @@ const struct document *element_document(const xmlNode *n)
     return n->doc->_private;
 }
 
-static bool same_namespace(const xmlNs *a, const xmlNs *b)
+static bool has_our_namespace(const xmlNode *n)
 {
-    if (a == NULL || b == NULL)
-        return a == b;
-    return xmlStrEqual(a->href, b->href);
+    const xmlNs *a = n->ns, *b = xmlDocGetRootElement(n->doc)->ns;
+    return a == b || (a != NULL && b != NULL && xmlStrEqual(a->href, b->href));
 }
 
-xmlNode *element_first_child(const xmlNode *n)
+const xmlNode *element_first_child(const xmlNode *n)
 {
     return xmlFirstElementChild((xmlNode *)n);
 }
 
-xmlNode *element_next_sibling(const xmlNode *n)
+const xmlNode *element_next_sibling(const xmlNode *n)
 {
     return xmlNextElementSibling((xmlNode *)n);
 }
 
 bool element_is(const xmlNode *n, const char *name)
 {
-    return strcmp((const char *)n->name, name) == 0 &&
-           same_namespace(n->ns, xmlDocGetRootElement(n->doc)->ns);
+    return n != NULL && strcmp((const char *)n->name, name) == 0 && has_our_namespace(n);
 }
 
-bool element_word_is_one_of(const char *word, const char *words)
+/* A word of a list as element_check() has it. */
+struct word {
+    const char *names; /* between bars */
+    int length;
+    char how_many; /* '?', '*', or else one */
+};
+
+/* The next of a list, which is taken from it. False at the end. */
+static bool next_word(const char **list, struct word *w)
 {
-    for (; *words != '\0'; words += strspn(words, " ")) {
-        size_t length = strcspn(words, " ");
-        if (strlen(word) == length && memcmp(word, words, length) == 0)
+    *list += strspn(*list, " ");
+    w->names = *list;
+    w->length = (int)strcspn(*list, " ");
+    *list += w->length;
+    if (w->length == 0)
+        return false;
+    w->how_many = w->names[w->length - 1];
+    if (w->how_many == '?' || w->how_many == '*')
+        w->length--;
+    return true;
+}
+
+static bool word_has(const struct word *w, const char *name)
+{
+    size_t size = strlen(name);
+    for (const char *at = w->names, *end = at + w->length; at < end;) {
+        const char *bar = memchr(at, '|', (size_t)(end - at));
+        bar = bar != NULL ? bar : end;
+        if ((size_t)(bar - at) == size && memcmp(at, name, size) == 0)
             return true;
-        words += length;
+        at = bar + 1;
     }
     return false;
 }
 
-bool element_is_one_of(const xmlNode *n, const char *words)
+int element_place_among(const char *name, const char *words)
 {
-    return element_word_is_one_of((const char *)n->name, words) &&
-           same_namespace(n->ns, xmlDocGetRootElement(n->doc)->ns);
+    struct word w;
+    for (int place = 0; next_word(&words, &w); place++)
+        if (word_has(&w, name) || w.length == 0)
+            return place;
+    return -1;
 }
 
-bool element_only_children(struct loader *ld, const xmlNode *n, const char *words)
+bool element_is_one_of(const xmlNode *n, const char *words)
 {
+    return n != NULL && element_place_among((const char *)n->name, words) >= 0 &&
+           has_our_namespace(n);
+}
+
+bool element_check(struct loader *ld, const xmlNode *n, const char *words)
+{
+    struct word w;
     for (const xmlNode *c = element_first_child(n); c != NULL; c = element_next_sibling(c))
         if (!element_is_one_of(c, words))
             return element_fail_unexpected(ld, c);
-    return true;
+    while (n != NULL && next_word(&words, &w)) {
+        const xmlNode *one = NULL;
+        if (w.how_many == '*')
+            continue;
+        for (const xmlNode *c = element_first_child(n); c != NULL; c = element_next_sibling(c)) {
+            if (!word_has(&w, (const char *)c->name) || !has_our_namespace(c))
+                continue;
+            if (one != NULL)
+                return xmlStrEqual(one->name, c->name)
+                           ? fail_at(ld, c, "a second <%.60s> in <%.60s>", (const char *)c->name,
+                                     (const char *)n->name)
+                           : element_fail_unexpected(ld, c);
+            one = c;
+        }
+        if (one == NULL && w.how_many != '?')
+            return fail_at(ld, n, "<%.60s> without <%.*s>", (const char *)n->name, w.length,
+                           w.names);
+    }
+    return !ld->failed;
 }
 
-xmlNode *element_child_named(const xmlNode *n, const char *name)
+const xmlNode *element_child(const xmlNode *n, const char *name)
 {
-    for (xmlNode *c = element_first_child(n); c != NULL; c = element_next_sibling(c))
-        if (element_is(c, name))
-            return c;
-    return NULL;
-}
-
-bool element_one_child(struct loader *ld, const xmlNode *n, const char *name, xmlNode **out)
-{
-    *out = element_child_named(n, name);
-    if (*out == NULL)
-        return true;
-    for (const xmlNode *c = element_next_sibling(*out); c != NULL; c = element_next_sibling(c))
-        if (element_is(c, name))
-            return fail_at(ld, c, "a second <%s> in <%.60s>", name, (const char *)n->name);
-    return true;
+    const xmlNode *c = element_first_child(n);
+    while (c != NULL && !element_is(c, name))
+        c = element_next_sibling(c);
+    return c;
 }
 
 const char *element_attribute(const xmlNode *n, const char *name)
 {
-    for (const xmlAttr *a = n->properties; a != NULL; a = a->next)
+    for (const xmlAttr *a = n != NULL ? n->properties : NULL; a != NULL; a = a->next)
         if (a->ns == NULL && strcmp((const char *)a->name, name) == 0)
             return a->children != NULL && a->children->content != NULL
                        ? (const char *)a->children->content
@@ -129,37 +184,34 @@ const char *element_attribute(const xmlNode *n, const char *name)
     return NULL;
 }
 
-bool element_attribute_count_or(struct loader *ld, const xmlNode *n, const char *name,
-                                uint64_t missing, uint64_t *out)
+const char *element_needed_attribute(struct loader *ld, const xmlNode *n, const char *name)
+{
+    const char *value = element_attribute(n, name);
+    if (value == NULL && !ld->failed)
+        fail_at(ld, n, "<%.60s> without attribute '%s'", (const char *)n->name, name);
+    return value != NULL ? value : "";
+}
+
+uint64_t element_count_or(struct loader *ld, const xmlNode *n, const char *name, uint64_t missing)
 {
     const char *s = element_attribute(n, name);
-    if (s == NULL) {
-        *out = missing;
-        return true;
-    }
+    if (s == NULL)
+        return missing;
     s += strspn(s, " ");
     uint64_t v = 0;
     size_t digits = strspn(s, "0123456789");
     for (size_t i = 0; i < digits && v < UINT32_MAX; i++)
         v = 10 * v + (uint64_t)(s[i] - '0');
     if (digits == 0 || s[digits + strspn(s + digits, " ")] != '\0' || v >= UINT32_MAX)
-        return fail_at(ld, n, "<%.60s>: attribute %s=\"%.60s\" is not a number below 2^32-1",
-                       (const char *)n->name, name, element_attribute(n, name));
-    *out = v;
-    return true;
+        fail_at(ld, n, "<%.60s>: attribute %s=\"%.60s\" is not a number below 2^32-1",
+                (const char *)n->name, name, element_attribute(n, name));
+    return v;
 }
 
-bool element_attribute_count(struct loader *ld, const xmlNode *n, const char *name, uint64_t *out)
+uint64_t element_count(struct loader *ld, const xmlNode *n, const char *name)
 {
-    if (element_attribute(n, name) == NULL)
-        return fail_at(ld, n, "<%.60s> without attribute '%s'", (const char *)n->name, name);
-    return element_attribute_count_or(ld, n, name, 0, out);
-}
-
-int element_compare_ids(const void *a, const void *b)
-{
-    const struct id_entry *x = a, *y = b;
-    return strcmp(x->id, y->id);
+    element_needed_attribute(ld, n, name);
+    return element_count_or(ld, n, name, 0);
 }
 
 bool element_is_own_profile(const char *profile)
@@ -167,33 +219,21 @@ bool element_is_own_profile(const char *profile)
     return profile != NULL && (strcmp(profile, "ASSAY") == 0 || strcmp(profile, "CGL") == 0);
 }
 
-bool element_own_technique(struct loader *ld, const xmlNode *n, xmlNode **out)
+const xmlNode *element_own_technique(struct loader *ld, const xmlNode *n)
 {
-    *out = NULL;
+    const xmlNode *own = NULL;
     for (const xmlNode *extra = element_first_child(n); extra != NULL;
          extra = element_next_sibling(extra)) {
-        if (!element_is(extra, "extra"))
-            continue;
-        for (xmlNode *t = element_first_child(extra); t != NULL; t = element_next_sibling(t)) {
+        const xmlNode *t = element_is(extra, "extra") ? element_first_child(extra) : NULL;
+        for (; t != NULL; t = element_next_sibling(t)) {
             if (!element_is(t, "technique") ||
                 !element_is_own_profile(element_attribute(t, "profile")))
                 continue;
-            if (*out != NULL)
-                return fail_at(ld, t, "<%.60s> has more than one technique of profile ASSAY or CGL",
-                               (const char *)n->name);
-            *out = t;
+            if (own != NULL)
+                fail_at(ld, t, "<%.60s> has more than one technique of profile ASSAY or CGL",
+                        (const char *)n->name);
+            own = t;
         }
     }
-    return true;
-}
-
-bool element_technique_content(struct loader *ld, const xmlNode *technique, xmlNode **out)
-{
-    *out = element_first_child(technique);
-    if (*out == NULL)
-        return fail_at(ld, technique, "empty technique of profile '%s'",
-                       element_attribute(technique, "profile"));
-    if (element_next_sibling(*out) != NULL)
-        return element_fail_unexpected(ld, element_next_sibling(*out));
-    return true;
+    return own;
 }

@@ -4,121 +4,82 @@
 
 #include <string.h>
 
-/* To support one more tag, give it a reader here. */
-struct material_tag {
-    const char *profile, *name;
-    bool (*read)(struct loader *ld, const xmlNode *tag, struct material *m);
-};
-
-#define IOR   "ior", FIELD_FLOAT, &m->ior, true, .lo = (double)(1 / MAX_IOR), .hi = MAX_IOR
-#define ALPHA "alpha", FIELD_FLOAT, &m->alpha, true, .lo = (double)MICROFACET_MIN_ALPHA, .hi = 10
-
-/* The assignment's emitter shines to both sides and reflects nothing. */
-static bool read_cgl_emission(struct loader *ld, const xmlNode *tag, struct material *m)
+/* The assignment's emitter shines to both sides; ours adds to the reflection of profile_COMMON, which is in *m
+ * already. */
+static void read_emission(struct loader *ld, const xmlNode *tag, bool is_cgl, struct material *m)
 {
-    m->radiance_both_sides = true;
-    return field_read_all(ld, tag, FIELDS({FIELD_OF_COLOR("radiance", &m->radiance, 0)}));
+    if (!is_cgl && !rgb_is_zero(m->radiance))
+        fail_at(ld, tag, "<emission> here and in profile_COMMON: give one");
+    element_check(ld, tag, is_cgl ? "radiance" : "radiance sides");
+    m->radiance = field_color(ld, tag, "radiance", FLT_MAX);
+    m->radiance_both_sides = is_cgl || field_choice(ld, tag, "sides", "1 2", 0) == 1;
 }
 
-/* Ours adds to the reflection of profile_COMMON, which is in *m already. */
-static bool read_assay_emission(struct loader *ld, const xmlNode *tag, struct material *m)
+static void read_mirror(struct loader *ld, const xmlNode *tag, bool is_cgl, struct material *m)
 {
-    if (!rgb_is_zero(m->radiance))
-        return fail_at(ld, tag, "<emission> here and in profile_COMMON: give one");
-    return field_read_all(
-        ld, tag,
-        FIELDS({FIELD_OF_COLOR("radiance", &m->radiance, 0)},
-               {"sides", FIELD_CHOICE, &m->radiance_both_sides, true, .words = {"1", "2"}}));
-}
-
-static bool read_mirror(struct loader *ld, const xmlNode *tag, struct material *m)
-{
+    (void)is_cgl;
+    element_check(ld, tag, "reflectance");
     m->kind = MATERIAL_MIRROR;
-    return field_read_all(ld, tag, FIELDS({FIELD_OF_COLOR("reflectance", &m->reflectance, 1)}));
+    m->reflectance = field_color(ld, tag, "reflectance", 1);
 }
 
-/* Smooth only. The assignment's files carry a <roughness> that nothing uses; another than 0 would
- * mean something. */
-static bool read_refraction(struct loader *ld, const xmlNode *tag, struct material *m)
+/* <glass> or <refraction>, smooth only. The assignment's files carry a <roughness> that nothing uses; another than 0
+ * would mean something. */
+static void read_dielectric(struct loader *ld, const xmlNode *tag, bool is_cgl, struct material *m)
 {
-    double roughness;
-    m->kind = MATERIAL_REFRACTION;
-    return field_read_all(ld, tag,
-                          FIELDS({FIELD_OF_COLOR("transmittance", &m->transmittance, 1)}, {IOR},
-                                 {"roughness", FIELD_NUMBER, &roughness, .lo = 0, .hi = 0}));
-}
-
-static bool read_glass(struct loader *ld, const xmlNode *tag, struct material *m)
-{
-    double roughness;
-    m->kind = MATERIAL_GLASS;
-    return field_read_all(ld, tag,
-                          FIELDS({FIELD_OF_COLOR("transmittance", &m->transmittance, 1)},
-                                 {FIELD_OF_COLOR("reflectance", &m->reflectance, 1)}, {IOR},
-                                 {"roughness", FIELD_NUMBER, &roughness, .lo = 0, .hi = 0}));
+    bool is_glass = element_is(tag, "glass");
+    (void)is_cgl;
+    element_check(ld, tag,
+                  is_glass ? "transmittance reflectance ior roughness?"
+                           : "transmittance ior roughness?");
+    m->kind = is_glass ? MATERIAL_GLASS : MATERIAL_REFRACTION;
+    m->reflectance = field_color(ld, tag, "reflectance", 1);
+    m->transmittance = field_color(ld, tag, "transmittance", 1);
+    m->ior = (float)field_number(ld, tag, "ior", 1, (double)(1 / MAX_IOR), MAX_IOR);
+    field_number(ld, tag, "roughness", 0, 0, 0);
 }
 
 /* The assignment's conductor: Beckmann, heights correlated, Fresnel by eta and k. */
-static bool read_cgl_microfacet(struct loader *ld, const xmlNode *tag, struct material *m)
+static void read_microfacet(struct loader *ld, const xmlNode *tag, bool is_cgl, struct material *m)
 {
+    m->conductor = is_cgl || element_child(tag, "reflectance") == NULL;
+    element_check(ld, tag,
+                  is_cgl         ? "alpha eta k"
+                  : m->conductor ? "alpha eta k distribution? shadowing?"
+                                 : "alpha reflectance distribution? shadowing?");
     m->kind = MATERIAL_MICROFACET;
-    m->microfacet = MICROFACET_BECKMANN;
-    m->conductor = true;
-    return field_read_all(ld, tag,
-                          FIELDS({ALPHA}, {FIELD_OF_COLOR("eta", &m->eta, 1000)},
-                                 {FIELD_OF_COLOR("k", &m->k, 1000)}));
+    m->microfacet = is_cgl || field_choice(ld, tag, "distribution", "ggx beckmann", 0) == 1
+                        ? MICROFACET_BECKMANN
+                        : MICROFACET_GGX;
+    m->separable = field_choice(ld, tag, "shadowing", "correlated separable", 0) == 1;
+    m->alpha = (float)field_number(ld, tag, "alpha", 1, (double)MICROFACET_MIN_ALPHA, 10);
+    m->eta = field_color(ld, tag, "eta", 1000);
+    m->k = field_color(ld, tag, "k", 1000);
+    m->reflectance = field_color(ld, tag, "reflectance", 1);
 }
 
-static bool read_assay_microfacet(struct loader *ld, const xmlNode *tag, struct material *m)
-{
-    bool beckmann = false;
-    const struct field distribution = {"distribution", FIELD_CHOICE, &beckmann,
-                                       .words = {"ggx", "beckmann"}},
-                       shadowing = {"shadowing", FIELD_CHOICE, &m->separable,
-                                    .words = {"correlated", "separable"}};
-    m->kind = MATERIAL_MICROFACET;
-    m->conductor = element_child_named(tag, "reflectance") == NULL;
-    bool ok = m->conductor
-                  ? field_read_all(ld, tag,
-                                   FIELDS(distribution, shadowing, {ALPHA},
-                                          {FIELD_OF_COLOR("eta", &m->eta, 1000)},
-                                          {FIELD_OF_COLOR("k", &m->k, 1000)}))
-                  : field_read_all(ld, tag,
-                                   FIELDS(distribution, shadowing, {ALPHA},
-                                          {FIELD_OF_COLOR("reflectance", &m->reflectance, 1)}));
-    m->microfacet = beckmann ? MICROFACET_BECKMANN : MICROFACET_GGX;
-    return ok;
-}
-
-/* All but the first take the place of what profile_COMMON reflects. */
-static const struct material_tag TAGS[] = {
-    {"ASSAY", "emission", read_assay_emission},
-    {"ASSAY", "mirror", read_mirror},
-    {"ASSAY", "glass", read_glass},
-    {"ASSAY", "refraction", read_refraction},
-    {"ASSAY", "microfacet", read_assay_microfacet},
-    {"CGL", "emission", read_cgl_emission},
-    {"CGL", "mirror", read_mirror},
-    {"CGL", "glass", read_glass},
-    {"CGL", "refraction", read_refraction},
-    {"CGL", "microfacet", read_cgl_microfacet},
+/* To support one more tag, give it a reader here. */
+static const struct material_tag {
+    const char *name;
+    void (*read)(struct loader *ld, const xmlNode *tag, bool is_cgl, struct material *m);
+} TAGS[] = {
+    {"emission", read_emission},     {"mirror", read_mirror},         {"glass", read_dielectric},
+    {"refraction", read_dielectric}, {"microfacet", read_microfacet},
 };
 
-bool extra_read_material(struct loader *ld, const xmlNode *technique, struct material *m)
+void extra_read_material(struct loader *ld, const xmlNode *technique, struct material *m)
 {
-    const char *profile = element_attribute(technique, "profile");
-    xmlNode *tag;
-    if (!element_technique_content(ld, technique, &tag))
-        return false;
+    bool is_cgl = strcmp(element_attribute(technique, "profile"), "CGL") == 0;
+    const xmlNode *tag = element_first_child(technique);
+    if (!element_check(ld, technique, "emission|mirror|glass|refraction|microfacet"))
+        return;
+    if (is_cgl || !element_is(tag, "emission")) { /* which takes the place of what reflects */
+        m->kind = MATERIAL_DIFFUSE;
+        m->reflectance = m->specular = m->mirror = grey(0);
+        m->reflectance_map = 0;
+        m->separable = false;
+    }
     for (size_t i = 0; i < sizeof TAGS / sizeof *TAGS; i++)
-        if (strcmp(TAGS[i].profile, profile) == 0 && element_is(tag, TAGS[i].name)) {
-            if (i > 0) {
-                m->kind = MATERIAL_DIFFUSE;
-                m->reflectance = m->specular = m->mirror = grey(0);
-                m->reflectance_map = 0;
-                m->separable = false;
-            }
-            return TAGS[i].read(ld, tag, m);
-        }
-    return fail_at(ld, tag, "unknown material tag '%.60s'", (const char *)tag->name);
+        if (element_is(tag, TAGS[i].name))
+            TAGS[i].read(ld, tag, is_cgl, m);
 }

@@ -4,80 +4,73 @@
 #include <string.h>
 
 /* What a channel of a shader says, itself (by the element `own`) or by a parameter of one of those
- * kinds; a line for a texture. *value NULL: nothing. */
-static bool find_value(struct loader *ld, const xmlNode *shader, const char *name, const char *own,
-                       const char *kinds, const xmlNode **value)
+ * kinds; a line for a texture. NULL: nothing. */
+static const xmlNode *find_value(struct loader *ld, const xmlNode *shader, const char *name,
+                                 const char *own, const char *kinds)
 {
-    xmlNode *channel;
-    struct texture_use texture;
-    *value = NULL;
-    if (!element_one_child(ld, shader, name, &channel) || channel == NULL)
-        return channel == NULL;
-    *value = element_first_child(channel);
-    if (*value == NULL)
-        return fail_at(ld, channel, "<%s> without <%s>", name, own);
-    if (element_next_sibling(*value) != NULL)
-        return element_fail_unexpected(ld, element_next_sibling(*value));
-    if (element_is(*value, "param"))
-        return parameter_get(ld, *value, element_attribute(*value, "ref"), kinds, value);
-    if (element_is(*value, "texture") && strcmp(own, "color") == 0)
-        return parameter_get_texture(ld, *value, &texture) &&
-               fail_at(ld, *value, "<%s> by <texture> is not supported%s", name,
-                       ld->dialect == DIALECT_COLLADA ? " (--dialect cgl ignores it)" : "");
-    return element_is(*value, own) || element_fail_unexpected(ld, *value);
+    const xmlNode *channel = element_child(shader, name), *value = element_first_child(channel);
+    bool is_color = strcmp(own, "color") == 0;
+    if (channel == NULL ||
+        !element_check(ld, channel, is_color ? "color|param|texture" : "float|param"))
+        return NULL;
+    if (element_is(value, "param"))
+        return parameter_get(ld, value, element_attribute(value, "ref"), kinds);
+    if (element_is(value, "texture")) {
+        parameter_get_texture(ld, value);
+        fail_at(ld, value, "<%s> by <texture> is not supported%s", name,
+                ld->dialect == DIALECT_COLLADA ? " (--dialect cgl ignores it)" : "");
+    }
+    return value;
 }
 
 /* One channel of a shader: a missing element leaves *value and *alpha as they are. */
 static bool read_channel(struct loader *ld, const xmlNode *shader, const char *name, rgb *value,
                          double *alpha)
 {
-    const xmlNode *color;
-    return find_value(ld, shader, name, "color", "float3 float4", &color) &&
-           (color == NULL || text_read_color(ld, color, value, alpha));
+    const xmlNode *color = find_value(ld, shader, name, "color", "float3 float4");
+    if (color != NULL)
+        text_read_color(ld, color, value, alpha);
+    return !ld->failed;
 }
 
 /* The same, or a <texture>: *value is then white. */
 static bool read_mapped_channel(struct loader *ld, const xmlNode *shader, const char *name,
                                 rgb *value, uint32_t *map)
 {
-    xmlNode *channel;
-    const char *texcoord, *other = ld->texcoord;
-    if (!element_one_child(ld, shader, name, &channel))
-        return false;
-    const xmlNode *texture = channel != NULL ? element_first_child(channel) : NULL;
-    if (texture == NULL || !element_is(texture, "texture"))
+    const xmlNode *channel = element_child(shader, name),
+                  *texture = element_child(channel, "texture");
+    const char *other = ld->texcoord;
+    if (texture == NULL)
         return read_channel(ld, shader, name, value, NULL);
-    if (element_next_sibling(texture) != NULL)
-        return element_fail_unexpected(ld, element_next_sibling(texture));
-    if (!texture_get(ld, texture, map, &texcoord))
-        return false;
+    element_check(ld, channel, "texture");
+    *map = texture_get(ld, texture, &ld->texcoord);
     *value = grey(1);
-    ld->texcoord = texcoord;
-    return other == NULL || (texcoord != NULL && strcmp(texcoord, other) == 0) ||
-           fail_at(ld, texture, "a second set of texture coordinates in one material");
+    if (other != NULL && (ld->texcoord == NULL || strcmp(ld->texcoord, other) != 0))
+        fail_at(ld, texture, "a second set of texture coordinates in one material");
+    return !ld->failed;
 }
 
 static bool read_factor(struct loader *ld, const xmlNode *shader, const char *name, double *value)
 {
-    const xmlNode *number;
-    return find_value(ld, shader, name, "float", "float", &number) &&
-           (number == NULL || text_read_exactly(ld, number, value, 1));
+    const xmlNode *number = find_value(ld, shader, name, "float", "float");
+    if (number != NULL)
+        text_read_exactly(ld, number, value, 1);
+    return !ld->failed;
 }
 
 /* COLLADA 1.5 "Determining Transparency (Opacity)": all of the light passes, or none. */
 static bool read_opacity(struct loader *ld, const xmlNode *shader)
 {
-    xmlNode *transparent;
+    const xmlNode *transparent = element_child(shader, "transparent");
     rgb color = grey(1);
     double alpha = 1, factor = 1;
-    if (!element_one_child(ld, shader, "transparent", &transparent) ||
-        !read_channel(ld, shader, "transparent", &color, &alpha) ||
+    if (!read_channel(ld, shader, "transparent", &color, &alpha) ||
         !read_factor(ld, shader, "transparency", &factor))
         return false;
     const char *mode = transparent != NULL ? element_attribute(transparent, "opaque") : NULL;
     mode = mode != NULL ? mode : "A_ONE";
     bool by_alpha = mode[0] == 'A';
-    if (!element_word_is_one_of(mode, "A_ONE A_ZERO RGB_ONE RGB_ZERO"))
+    if (element_place_among(mode, "A_ONE A_ZERO RGB_ONE RGB_ZERO") < 0)
         return fail_at(ld, transparent, "unknown opaque=\"%.60s\"", mode);
     double most = (by_alpha ? alpha : (double)rgb_max(color)) * factor,
            least = (by_alpha ? alpha : (double)fminf(fminf(color.r, color.g), color.b)) * factor,
@@ -85,8 +78,7 @@ static bool read_opacity(struct loader *ld, const xmlNode *shader)
     ld->is_transparent = most == 1 - opaque && least == most;
     if (ld->is_transparent || (most == opaque && least == most))
         return true;
-    return fail_at(ld,
-                   transparent != NULL ? transparent : element_child_named(shader, "transparency"),
+    return fail_at(ld, transparent != NULL ? transparent : element_child(shader, "transparency"),
                    "transparency is not supported (--dialect cgl ignores it)");
 }
 
@@ -120,8 +112,7 @@ static bool read_highlight(struct loader *ld, const xmlNode *shader, struct mate
     m->mirror = rgb_scale(reflective, (float)fmax(0, reflectivity));
     const bool shines = !rgb_is_zero(m->specular), mirrors = !rgb_is_zero(m->mirror);
     if (shines && element_is(shader, "lambert"))
-        return fail_at(ld, element_child_named(shader, "specular"),
-                       "a <lambert> that is <specular>");
+        return fail_at(ld, element_child(shader, "specular"), "a <lambert> that is <specular>");
     if (!shines && !mirrors)
         return true;
     const double n = fmax(0, shininess) * (element_is(shader, "phong") ? 4 : 1);
@@ -144,190 +135,155 @@ static bool has_highlight(const struct loader *ld, const xmlNode *shader)
     struct err ignored;
     struct loader quiet = *ld;
     rgb specular = grey(0);
+    const xmlNode *channel = element_child(shader, "specular"),
+                  *color = element_child(channel, "color");
     quiet.err = &ignored;
-    return !read_channel(&quiet, shader, "specular", &specular, NULL) || !rgb_is_zero(specular);
+    if (color != NULL && text_read_color(&quiet, color, &specular, NULL))
+        return !rgb_is_zero(specular);
+    return channel != NULL;
 }
 
 static bool read_shader(struct loader *ld, const xmlNode *shader, struct material *m)
 {
     bool is_constant = element_is(shader, "constant");
-    if (!element_only_children(
-            ld, shader,
-            is_constant ? "emission reflective reflectivity transparent transparency "
-                          "index_of_refraction"
-                        : "emission ambient diffuse specular shininess reflective reflectivity "
-                          "transparent transparency index_of_refraction"))
-        return false;
+    element_check(ld, shader,
+                  is_constant ? "emission? reflective? reflectivity? transparent? transparency? "
+                                "index_of_refraction?"
+                              : "emission? ambient? diffuse? specular? shininess? reflective? "
+                                "reflectivity? transparent? transparency? index_of_refraction?");
     m->reflectance = grey(ld->dialect == DIALECT_CGL && !is_constant ? 0.5f : 0);
     m->radiance_both_sides = true;
     if (!read_mapped_channel(ld, shader, "diffuse", &m->reflectance, &m->reflectance_map) ||
         !read_mapped_channel(ld, shader, "emission", &m->radiance, &m->radiance_map))
         return false;
     if (rgb_max(m->reflectance) > 1)
-        return fail_at(ld, element_child_named(shader, "diffuse"), "diffuse reflectance above 1");
+        return fail_at(ld, element_child(shader, "diffuse"), "diffuse reflectance above 1");
     if (ld->dialect == DIALECT_COLLADA)
         return read_opacity(ld, shader) && (ld->is_transparent || read_highlight(ld, shader, m));
     if (!rgb_is_zero(m->radiance))
-        return fail_at(ld, element_child_named(shader, "emission"),
+        return fail_at(ld, element_child(shader, "emission"),
                        "the assignment has no emission in profile_COMMON: use a technique of "
                        "profile CGL");
     ld->num_specular += has_highlight(ld, shader);
     return true;
 }
 
-static bool read_common(struct loader *ld, const xmlNode *common, struct material *m)
+static void read_common(struct loader *ld, const xmlNode *common, struct material *m)
 {
-    xmlNode *technique;
-    if (!element_only_children(ld, common, "asset image newparam technique extra") ||
-        !element_one_child(ld, common, "technique", &technique))
-        return false;
-    if (technique == NULL)
-        return fail_at(ld, common, "<profile_COMMON> without <technique>");
-    const xmlNode *shader = NULL;
-    for (const xmlNode *c = element_first_child(technique); c != NULL;
-         c = element_next_sibling(c)) {
-        if (element_is_one_of(c, "asset annotate image newparam extra"))
-            continue;
-        if (!element_is_one_of(c, "constant lambert phong blinn") || shader != NULL)
-            return element_fail_unexpected(ld, c);
-        shader = c;
-    }
-    if (shader == NULL)
-        return fail_at(ld, technique,
-                       "<technique> without <lambert>, <phong>, <blinn> or <constant>");
-    return read_shader(ld, shader, m);
+    element_check(ld, common, "asset? image* newparam* technique extra*");
+    const xmlNode *technique = element_child(common, "technique"),
+                  *shader = element_first_child(technique);
+    element_check(ld, technique,
+                  "asset? annotate* image* newparam* extra* lambert|phong|blinn|constant");
+    while (shader != NULL && !element_is_one_of(shader, "lambert phong blinn constant"))
+        shader = element_next_sibling(shader);
+    if (!ld->failed)
+        read_shader(ld, shader, m);
 }
 
-static bool read_effect(struct loader *ld, const xmlNode *effect, struct material *m)
+static void read_effect(struct loader *ld, const xmlNode *effect, struct material *m)
 {
-    xmlNode *technique, *common;
-    for (const xmlNode *c = element_first_child(effect); c != NULL; c = element_next_sibling(c))
-        if (!element_is_one_of(c, "asset annotate image newparam extra") &&
-            strncmp((const char *)c->name, "profile_", 8) != 0)
-            return element_fail_unexpected(ld, c);
-    if (!element_own_technique(ld, effect, &technique) ||
-        !element_one_child(ld, effect, "profile_COMMON", &common))
-        return false;
+    element_check(ld, effect,
+                  "asset? annotate* image* newparam* extra* profile_COMMON? profile_BRIDGE* "
+                  "profile_CG* profile_GLES* profile_GLES2* profile_GLSL*");
+    const xmlNode *technique = element_own_technique(ld, effect),
+                  *common = element_child(effect, "profile_COMMON");
     bool is_cgl = technique != NULL && strcmp(element_attribute(technique, "profile"), "CGL") == 0;
-    if (is_cgl)
-        return extra_read_material(ld, technique, m);
     if (common == NULL && technique == NULL) /* of shaders alone: as no material */
         ld->num_left_out[LEFT_OUT_MATERIAL] += ld->dialect == DIALECT_COLLADA;
-    if (common != NULL && !read_common(ld, common, m))
-        return false;
-    if (technique != NULL && ld->is_transparent)
-        return fail_at(ld, technique, "a technique of ours for a surface that is transparent");
-    if (technique == NULL)
-        return true;
-    return extra_read_material(ld, technique, m);
+    if (!is_cgl && common != NULL)
+        read_common(ld, common, m);
+    if (technique == NULL || ld->failed)
+        return;
+    if (ld->is_transparent)
+        fail_at(ld, technique, "a technique of ours for a surface that is transparent");
+    extra_read_material(ld, technique, m);
 }
 
-static bool read_material(struct loader *ld, const xmlNode *material, struct material *m)
+static void read_material(struct loader *ld, const xmlNode *material, struct material *m)
 {
-    xmlNode *instance;
-    const xmlNode *effect;
-    if (!element_only_children(ld, material, "asset instance_effect extra") ||
-        !element_one_child(ld, material, "instance_effect", &instance))
-        return false;
-    if (instance == NULL)
-        return fail_at(ld, material, "<material> without <instance_effect>");
-    if (!element_only_children(ld, instance, "technique_hint setparam extra") ||
-        !reference_follow(ld, instance, "url", "effect", &effect))
-        return false;
     const char *name = element_attribute(material, "name"), *id = element_attribute(material, "id");
+    element_check(ld, material, "asset? instance_effect extra*");
+    const xmlNode *instance = element_child(material, "instance_effect");
+    element_check(ld, instance, "technique_hint* setparam* extra*");
+    const xmlNode *effect = reference_follow(ld, instance, "url", "effect");
     ld->instance_effect = instance;
     ld->is_transparent = false;
     build_copy_name(m->name, sizeof m->name, name != NULL ? name : id != NULL ? id : "material");
-    return read_effect(ld, effect, m);
+    if (effect != NULL)
+        read_effect(ld, effect, m);
 }
 
 /* material NULL: what the assignment, or else Blender, takes for a surface without material. */
-static bool slot_get(struct loader *ld, const xmlNode *material, uint32_t *index,
-                     const char **texcoord)
+static struct material_slot slot_get(struct loader *ld, const xmlNode *material)
 {
-    for (size_t i = 0; i < ld->num_slots; i++) {
-        if (ld->slots[i].node == material) {
-            *index = ld->slots[i].index;
-            *texcoord = ld->slots[i].texcoord;
-            return true;
-        }
-    }
-    ld->texcoord = NULL;
+    for (size_t i = 0; i < ld->num_slots; i++)
+        if (ld->slots[i].node == material)
+            return ld->slots[i];
+    struct material_slot slot = {.node = material, .index = NO_SURFACE};
     struct material m = {
         .name = "default",
         .kind = MATERIAL_DIFFUSE,
         .reflectance = grey(ld->dialect == DIALECT_CGL ? 0.5f : 0.8f),
     };
-    if (material != NULL && !read_material(ld, material, &m))
-        return false;
-    struct material_slot *grown =
-        build_grow(ld, ld->slots, sizeof *grown, ld->num_slots, &ld->cap_slots);
-    if (grown == NULL)
-        return false;
-    ld->slots = grown;
-    if (material != NULL && ld->is_transparent)
-        *index = NO_SURFACE;
-    else if (!build_add_material(ld, &m, index))
-        return false;
-    *texcoord = ld->texcoord;
-    ld->slots[ld->num_slots++] = (struct material_slot){material, *index, *texcoord};
-    return true;
+    ld->texcoord = NULL;
+    if (material != NULL)
+        read_material(ld, material, &m);
+    if (material == NULL || !ld->is_transparent)
+        slot.index = build_add_material(ld, &m);
+    slot.texcoord = ld->texcoord;
+    ld->slots = build_grow(ld, ld->slots, sizeof *ld->slots, ld->num_slots);
+    if (!ld->failed)
+        ld->slots[ld->num_slots++] = slot;
+    return slot;
 }
 
-/* The <technique_common> of the <bind_material>, NULL if nothing is bound. */
-static bool find_bindings(struct loader *ld, const xmlNode *instance, xmlNode **common)
+/* The <instance_material>s of an instance, NULL if nothing is bound. */
+static const xmlNode *find_bindings(struct loader *ld, const xmlNode *instance)
 {
-    xmlNode *bind;
-    *common = NULL;
-    if (!element_only_children(ld, instance, "bind_material extra") ||
-        !element_one_child(ld, instance, "bind_material", &bind))
-        return false;
-    if (bind == NULL)
-        return true;
-    return element_only_children(ld, bind, "param technique_common technique extra") &&
-           element_one_child(ld, bind, "technique_common", common) &&
-           (*common == NULL || element_only_children(ld, *common, "instance_material"));
+    const xmlNode *bind = element_child(instance, "bind_material"),
+                  *common = element_child(bind, "technique_common");
+    element_check(ld, instance, "bind_material? extra*");
+    element_check(ld, bind, "param* technique_common? technique* extra*");
+    element_check(ld, common, "instance_material*");
+    return element_first_child(common);
 }
 
-bool material_get(struct loader *ld, const xmlNode *instance, const xmlNode *user,
-                  const char *symbol, const struct mesh_group *group, uint32_t *index,
-                  size_t *uv_set)
+uint32_t material_get(struct loader *ld, const xmlNode *instance, const xmlNode *user,
+                      const char *symbol, const struct mesh_group *group, size_t *uv_set)
 {
-    const char *texcoord;
-    xmlNode *common;
-    const xmlNode *material = NULL;
-    if (!find_bindings(ld, instance, &common))
-        return false;
-    const xmlNode *first = common != NULL ? element_first_child(common) : NULL, *match = NULL;
-    for (const xmlNode *c = first; c != NULL; c = element_next_sibling(c)) {
-        const char *s = element_attribute(c, "symbol");
-        if (s == NULL)
-            return fail_at(ld, c, "<instance_material> without attribute 'symbol'");
-        if (!element_only_children(ld, c, "bind bind_vertex_input extra"))
-            return false;
+    bool is_cgl = ld->dialect == DIALECT_CGL;
+    const xmlNode *first = find_bindings(ld, instance), *match = NULL;
+    for (const xmlNode *c = first; c != NULL && !ld->failed; c = element_next_sibling(c)) {
+        const char *s = element_needed_attribute(ld, c, "symbol");
+        element_check(ld, c, "bind* bind_vertex_input* extra*");
         if (symbol != NULL && strcmp(s, symbol) != 0)
             continue;
-        if (match != NULL && ld->dialect == DIALECT_COLLADA && symbol == NULL && group != NULL) {
+        if (match != NULL && !is_cgl && symbol == NULL && group != NULL) {
             match = NULL; /* which of them nobody says */
             break;
         }
-        if (match != NULL && ld->dialect == DIALECT_COLLADA)
-            return symbol != NULL ? fail_at(ld, c, "a second binding of symbol '%.60s'", s)
-                                  : fail_at(ld, c, "two materials for one surface");
+        if (match != NULL && !is_cgl && symbol != NULL)
+            fail_at(ld, c, "a second binding of symbol '%.60s'", s);
+        else if (match != NULL && !is_cgl)
+            fail_at(ld, c, "two materials for one surface");
         match = match != NULL ? match : c;
     }
-    if (match == NULL && ld->dialect == DIALECT_CGL)
+    if (match == NULL && is_cgl)
         match = first;
-    if (match == NULL && ld->dialect == DIALECT_COLLADA && symbol != NULL && first != NULL)
-        return fail_at(ld, instance, "no material bound to symbol '%.60s' of line %ld", symbol,
-                       element_line(user));
-    if (match == NULL)
-        ld->num_left_out[LEFT_OUT_MATERIAL] += ld->dialect == DIALECT_COLLADA;
-    else if (!reference_follow(ld, match, "target", "material", &material))
-        return false;
-    if (!slot_get(ld, material, index, &texcoord))
-        return false;
-    ld->num_left_out[LEFT_OUT_TRANSPARENT] += *index == NO_SURFACE;
-    return *index == NO_SURFACE || !material_has_map(&ld->scene.materials[*index]) ||
-           texture_find_set(ld, instance, match, texcoord, group, uv_set);
+    if (match == NULL && !is_cgl && symbol != NULL && first != NULL)
+        fail_at(ld, instance, "no material bound to symbol '%.60s' of line %ld", symbol,
+                element_line(user));
+    ld->num_left_out[LEFT_OUT_MATERIAL] += match == NULL && !is_cgl;
+    const xmlNode *material =
+        match != NULL ? reference_follow(ld, match, "target", "material") : NULL;
+    if (ld->failed)
+        return NO_SURFACE;
+    const struct material_slot slot = slot_get(ld, material);
+    *uv_set = 0;
+    ld->num_left_out[LEFT_OUT_TRANSPARENT] += slot.index == NO_SURFACE;
+    if (!ld->failed && slot.index != NO_SURFACE &&
+        material_has_map(&ld->scene.materials[slot.index]))
+        *uv_set = texture_find_set(ld, instance, match, slot.texcoord, group);
+    return slot.index;
 }

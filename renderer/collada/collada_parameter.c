@@ -1,7 +1,6 @@
 /* What the values of a shader lead to: parameters of effects, and images behind textures. */
 #include "collada_internal.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 /* The child of n of that element whose attribute says `value`. */
@@ -24,70 +23,61 @@ static const xmlNode *find(const struct loader *ld, const xmlNode *user, const c
            user->parent->type == XML_ELEMENT_NODE;
          user = user->parent)
         n = find_child(user, "newparam", "sid", sid);
-    const xmlNode *value = n != NULL ? element_first_child(n) : NULL;
-    while (value != NULL && element_is_one_of(value, "annotate semantic modifier"))
+    const xmlNode *value = element_first_child(n);
+    while (element_is_one_of(value, "annotate semantic modifier"))
         value = element_next_sibling(value);
     return value;
 }
 
-bool parameter_get(struct loader *ld, const xmlNode *user, const char *sid, const char *kinds,
-                   const xmlNode **value)
+const xmlNode *parameter_get(struct loader *ld, const xmlNode *user, const char *sid,
+                             const char *kinds)
 {
-    *value = sid != NULL ? find(ld, user, sid) : NULL;
-    if (*value == NULL)
-        return fail_at(ld, user, "<%.60s>: no parameter '%.200s' in this effect",
-                       (const char *)user->name, sid != NULL ? sid : "");
-    return element_is_one_of(*value, kinds) ||
-           fail_at(ld, user, "parameter '%.200s' is a <%.60s>, which does not fit here", sid,
-                   (const char *)(*value)->name);
-}
-
-/* The text of the only child `name` of n. *word NULL: there is no such child; else the caller frees. */
-static bool read_child_word(struct loader *ld, const xmlNode *n, const char *name, char **word)
-{
-    xmlNode *child;
-    *word = NULL;
-    if (!element_one_child(ld, n, name, &child) || child == NULL)
-        return child == NULL;
-    *word = text_read_word(ld, child);
-    return *word != NULL;
+    const xmlNode *value = sid != NULL ? find(ld, user, sid) : NULL;
+    if (value == NULL)
+        fail_at(ld, user, "<%.60s>: no parameter '%.200s' in this effect", (const char *)user->name,
+                sid != NULL ? sid : "");
+    else if (!element_is_one_of(value, kinds))
+        fail_at(ld, user, "parameter '%.200s' is a <%.60s>, which does not fit here", sid,
+                (const char *)value->name);
+    return ld->failed ? NULL : value;
 }
 
 /* COLLADA 1.4: <sampler2D> names a <surface>, which names an <image> (<init_from>, or <all> of
  * <init_planar>). */
-static bool follow_surface(struct loader *ld, const xmlNode *sampler, const xmlNode **image)
+static const xmlNode *follow_surface(struct loader *ld, const xmlNode *sampler)
 {
-    char *surface_name = NULL, *image_name = NULL;
-    const xmlNode *surface, *planar, *all = NULL;
-    const char *ref = NULL;
-    bool ok = read_child_word(ld, sampler, "source", &surface_name) &&
-              parameter_get(ld, sampler, surface_name, "surface", &surface) &&
-              read_child_word(ld, surface, "init_from", &image_name);
-    if (ok && (planar = element_child_named(surface, "init_planar")) != NULL)
-        all = element_child_named(planar, "all");
-    if (ok)
-        ref = image_name != NULL ? image_name : all != NULL ? element_attribute(all, "ref") : NULL;
-    ok = ok && (ref != NULL || fail_at(ld, surface, "<surface> without <init_from>")) &&
-         reference_find(ld, surface, ref, "image", image);
-    free(surface_name);
-    free(image_name);
-    return ok;
+    const xmlNode *source = element_child(sampler, "source");
+    const xmlNode *surface =
+        parameter_get(ld, sampler, source != NULL ? text_read_word(ld, source) : NULL, "surface");
+    if (!element_check(ld, surface, "init_from? init_planar? *"))
+        return NULL;
+    const xmlNode *from = element_child(surface, "init_from"),
+                  *all = element_child(element_child(surface, "init_planar"), "all");
+    const char *id = from != NULL ? text_read_word(ld, from) : element_attribute(all, "ref");
+    if (id != NULL)
+        return reference_find(ld, surface, id, "image");
+    fail_at(ld, surface, "<surface> without <init_from>");
+    return NULL;
 }
 
-bool parameter_get_texture(struct loader *ld, const xmlNode *texture, struct texture_use *out)
+struct texture_use parameter_get_texture(struct loader *ld, const xmlNode *texture)
 {
-    const char *name = element_attribute(texture, "texture");
-    xmlNode *instance;
-    if (name == NULL)
-        return fail_at(ld, texture, "<texture> without attribute 'texture'");
-    *out = (struct texture_use){.texcoord = element_attribute(texture, "texcoord")};
+    struct texture_use use = {.texcoord = element_attribute(texture, "texcoord")};
+    const char *name = element_needed_attribute(ld, texture, "texture");
+    if (ld->failed)
+        return use;
     /* Some programs name the image itself, as COLLADA 1.3 did. */
-    if (find(ld, texture, name) == NULL)
-        return reference_find(ld, texture, name, "image", &out->image);
-    if (!parameter_get(ld, texture, name, "sampler2D", &out->sampler) ||
-        !element_one_child(ld, out->sampler, "instance_image", &instance))
-        return false;
-    if (instance == NULL)
-        return follow_surface(ld, out->sampler, &out->image);
-    return reference_follow(ld, instance, "url", "image", &out->image);
+    if (find(ld, texture, name) == NULL) {
+        use.image = reference_find(ld, texture, name, "image");
+        return use;
+    }
+    use.sampler = parameter_get(ld, texture, name, "sampler2D");
+    element_check(ld, use.sampler,
+                  "source? instance_image? wrap_s? wrap_t? magfilter? border_color? *");
+    const xmlNode *instance = element_child(use.sampler, "instance_image");
+    if (ld->failed)
+        return use;
+    use.image = instance != NULL ? reference_follow(ld, instance, "url", "image")
+                                 : follow_surface(ld, use.sampler);
+    return use;
 }

@@ -7,71 +7,63 @@
 #include <string.h>
 
 /* The element of that id in a document. */
-static bool find(struct loader *ld, const struct document *in, const xmlNode *user, const char *id,
-                 const char *element, const xmlNode **out)
+static const xmlNode *find(struct loader *ld, const struct document *in, const xmlNode *user,
+                           const char *id, const char *element)
 {
-    struct id_entry key = {id, NULL};
-    const struct id_entry *end = in->ids + in->num_ids,
-                          *hit = in->num_ids > 0 ? bsearch(&key, in->ids, in->num_ids, sizeof key,
-                                                           element_compare_ids)
-                                                 : NULL;
+    const void *entry = xmlHashLookup(in->ids, (const xmlChar *)id);
+    const xmlNode *hit = entry;
     if (hit == NULL)
-        return fail_at(ld, user, "no element with id '%.200s'", id);
-    if ((hit > in->ids && element_compare_ids(hit - 1, hit) == 0) ||
-        (hit + 1 < end && element_compare_ids(hit + 1, hit) == 0))
-        return fail_at(ld, user, "more than one element has id '%.200s'", id);
-    if (!element_is(hit->node, element))
-        return fail_at(ld, user, "'%.200s' is a <%.60s>, not a <%s>", id,
-                       (const char *)hit->node->name, element);
-    *out = hit->node;
-    return true;
+        fail_at(ld, user, "no element with id '%.200s'", id);
+    else if (entry == in)
+        fail_at(ld, user, "more than one element has id '%.200s'", id);
+    else if (!element_is(hit, element))
+        fail_at(ld, user, "'%.200s' is a <%.60s>, not a <%s>", id, (const char *)hit->name,
+                element);
+    return ld->failed ? NULL : hit;
 }
 
-bool reference_find(struct loader *ld, const xmlNode *n, const char *id, const char *element,
-                    const xmlNode **out)
+const xmlNode *reference_find(struct loader *ld, const xmlNode *n, const char *id,
+                              const char *element)
 {
-    return find(ld, element_document(n), n, id, element, out);
+    return find(ld, element_document(n), n, id, element);
 }
 
-/* The document that the first `size` bytes of a reference name, relative to the one of n. */
-static bool open_beside(struct loader *ld, const xmlNode *n, const char *reference, size_t size,
-                        struct document **out)
+/* The document that the first `size` bytes of a reference name, relative to the one of n. NULL: failed. */
+static const struct document *open_beside(struct loader *ld, const xmlNode *n,
+                                          const char *reference, size_t size)
 {
-    char name[PATH_MAX], resolved[PATH_MAX], other[PATH_MAX];
-    if (!element_document(n)->is_file || size >= sizeof name || reference[0] == '/' ||
-        memchr(reference, ':', size) != NULL)
-        return fail_at(ld, n, "reference '%.200s' leads elsewhere than to a file beside this one",
-                       reference);
-    memcpy(name, reference, size);
-    name[size] = '\0';
-    text_decode_percents(name);
-    struct path path = fs_beside_file(element_document(n)->path, name);
-    if (realpath(path.s, resolved) == NULL)
-        return fail_at(ld, n, "reference '%.200s': cannot read: %s", reference, strerror(errno));
-    for (size_t i = 0; i < ld->num_documents; i++) {
-        *out = ld->documents[i];
-        if (realpath((*out)->path, other) != NULL && strcmp(other, resolved) == 0)
-            return true;
+    char resolved[PATH_MAX], other[PATH_MAX];
+    struct path name = fs_path("%.*s", (int)size, reference);
+    if (!element_document(n)->is_file || size >= PATH_MAX || reference[0] == '/' ||
+        memchr(reference, ':', size) != NULL) {
+        fail_at(ld, n, "reference '%.200s' leads elsewhere than to a file beside this one",
+                reference);
+        return NULL;
     }
-    struct text_input in = {.file = fs_open(path.s)};
-    if (in.file == NULL)
-        return fail_at(ld, n, "reference '%.200s': cannot read: %s", reference, strerror(errno));
-    bool ok = xml_open(ld, path.s, &in, out);
+    text_decode_percents(name.s);
+    struct path path = fs_beside_file(element_document(n)->path, name.s);
+    bool exists = realpath(path.s, resolved) != NULL;
+    for (size_t i = 0; exists && i < ld->num_documents; i++)
+        if (realpath(ld->documents[i]->path, other) != NULL && strcmp(other, resolved) == 0)
+            return ld->documents[i];
+    struct text_input in = {.file = exists ? fs_open(path.s) : NULL};
+    if (in.file == NULL) {
+        fail_at(ld, n, "reference '%.200s': cannot read: %s", reference, strerror(errno));
+        return NULL;
+    }
+    const struct document *d = xml_open(ld, path.s, &in);
     fclose(in.file);
-    return ok;
+    return d;
 }
 
-bool reference_follow(struct loader *ld, const xmlNode *n, const char *name, const char *element,
-                      const xmlNode **out)
+const xmlNode *reference_follow(struct loader *ld, const xmlNode *n, const char *name,
+                                const char *element)
 {
-    struct document *in;
-    const char *url = element_attribute(n, name), *id = url != NULL ? strchr(url, '#') : NULL;
-    if (url == NULL)
-        return fail_at(ld, n, "<%.60s> without attribute '%s'", (const char *)n->name, name);
-    if (id == url)
-        return reference_find(ld, n, url + 1, element, out);
+    const char *url = element_needed_attribute(ld, n, name), *id = strchr(url, '#');
     if (id == NULL)
-        return fail_at(ld, n, "reference '%.200s' without '#'", url);
-    return open_beside(ld, n, url, (size_t)(id - url), &in) &&
-           find(ld, in, n, id + 1, element, out);
+        fail_at(ld, n, "reference '%.200s' without '#'", url);
+    const struct document *in = id == url    ? element_document(n)
+                                : id != NULL ? open_beside(ld, n, url, (size_t)(id - url))
+                                             : NULL;
+    return in != NULL ? find(ld, in, n, id + 1, element) : NULL;
 }

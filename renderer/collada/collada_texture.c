@@ -8,156 +8,114 @@
 #include <string.h>
 
 /* The file that a URI means: relative to the document's directory, or after file://. */
-static bool find_file(struct loader *ld, const xmlNode *n, char *uri, struct path *out)
+static struct path find_file(struct loader *ld, const xmlNode *n)
 {
-    char *rest = strstr(uri, "://");
-    if (rest != NULL && strncmp(uri, "file://", 7) != 0)
-        return fail_at(ld, n, "an image from '%.200s' is not supported", uri);
-    text_decode_percents(uri);
-    if (rest != NULL)
-        *out = fs_path("%s", rest + 3);
-    else
-        *out = uri[0] == '/' ? fs_path("%s", uri) : fs_beside_file(element_document(n)->path, uri);
-    return true;
+    const char *word = text_read_word(ld, n), *rest = strstr(word, "://");
+    struct path uri = fs_path("%s", rest != NULL ? rest + 3 : word);
+    if (rest != NULL && strncmp(word, "file://", 7) != 0)
+        fail_at(ld, n, "an image from '%.200s' is not supported", word);
+    text_decode_percents(uri.s);
+    return rest != NULL || uri.s[0] == '/' ? uri : fs_beside_file(element_document(n)->path, uri.s);
 }
 
-/* The number of an image of the scene, which is read at the first call. */
-static bool get_image(struct loader *ld, const xmlNode *image, uint32_t *number)
+/* An image of the scene, which is read at the first call; NULL: failed. */
+static const struct image *get_image(struct loader *ld, const xmlNode *image)
 {
-    xmlNode *from, *ref = NULL;
-    struct path file;
     struct err why;
     struct scene *s = &ld->scene;
-    if (!element_one_child(ld, image, "init_from", &from) ||
-        (from != NULL && !element_one_child(ld, from, "ref", &ref)))
-        return false;
-    if (from == NULL)
-        return fail_at(ld, image, "<image> without <init_from>");
+    if (!element_check(ld, image, "init_from *"))
+        return NULL;
+    const xmlNode *from = element_child(image, "init_from"), *ref = element_child(from, "ref");
     from = ref != NULL ? ref : from;
-    char *uri = text_read_word(ld, from);
-    bool ok = uri != NULL && find_file(ld, from, uri, &file);
-    free(uri);
-    if (!ok)
-        return false;
-    for (*number = 0; *number < s->num_images; ++*number)
-        if (strcmp(image_get_attr(&s->images[*number], SCENE_IMAGE_FILE), file.s) == 0)
-            return true;
-    struct image *grown = build_grow(ld, s->images, sizeof *grown, s->num_images, &ld->cap_images);
-    if (grown == NULL)
-        return false;
-    s->images = grown;
-    struct image *im = &grown[s->num_images];
-    if (!image_read_colours(file.s, im, &why))
-        return fail_at(ld, from, "%s", why.msg);
+    struct path file = find_file(ld, from);
+    for (uint32_t i = 0; i < s->num_images; i++)
+        if (strcmp(image_get_attr(&s->images[i], SCENE_IMAGE_FILE), file.s) == 0)
+            return &s->images[i];
+    s->images = build_grow(ld, s->images, sizeof *s->images, s->num_images);
+    if (ld->failed)
+        return NULL;
+    struct image *im = &s->images[s->num_images];
+    if (!image_read_colours(file.s, im, &why)) {
+        fail_at(ld, from, "%s", why.msg);
+        return NULL;
+    }
     s->num_images++;
-    return image_set_attr(im, SCENE_IMAGE_FILE, file.s, &why) || fail_memory(ld);
-}
-
-/* The place of the text of n's child `name` among words; `missing` if there is no such child. */
-static bool read_word_of(struct loader *ld, const xmlNode *n, const char *name,
-                         const char *const *words, int missing, int *which)
-{
-    xmlNode *child = NULL;
-    *which = missing;
-    if (n == NULL || !element_one_child(ld, n, name, &child) || child == NULL)
-        return n == NULL || child == NULL;
-    char *word = text_read_word(ld, child);
-    for (*which = 0; word != NULL && words[*which] != NULL; ++*which)
-        if (strcmp(word, words[*which]) == 0)
-            break;
-    bool ok = word != NULL && (words[*which] != NULL ||
-                               fail_at(ld, child, "<%s> '%.60s' is not supported", name, word));
-    free(word);
-    return ok;
+    if (!image_set_attr(im, SCENE_IMAGE_FILE, file.s, &why))
+        fail_memory(ld);
+    return im;
 }
 
 /* Beyond the edges; a border is black unless it says more, and NONE is a border. */
-static bool read_sampler(struct loader *ld, const xmlNode *sampler, struct texture *t)
+static void read_sampler(struct loader *ld, const xmlNode *sampler, struct texture *t)
 {
-    static const char *const WRAPS[] = {"WRAP", "MIRROR", "CLAMP", "BORDER", "NONE", NULL};
-    static const char *const FILTERS[] = {"NEAREST",
-                                          "LINEAR",
-                                          "NONE",
-                                          "NEAREST_MIPMAP_NEAREST",
-                                          "LINEAR_MIPMAP_NEAREST",
-                                          "NEAREST_MIPMAP_LINEAR",
-                                          "LINEAR_MIPMAP_LINEAR",
-                                          NULL};
-    int wrap[2], filter;
-    xmlNode *border = NULL;
+    static const char WRAPS[] = "WRAP MIRROR CLAMP BORDER NONE";
+    const xmlNode *border = element_child(sampler, "border_color");
     rgb colour = grey(0);
-    if (!read_word_of(ld, sampler, "wrap_s", WRAPS, TEXTURE_WRAP, &wrap[0]) ||
-        !read_word_of(ld, sampler, "wrap_t", WRAPS, TEXTURE_WRAP, &wrap[1]) ||
-        !read_word_of(ld, sampler, "magfilter", FILTERS, 1, &filter) ||
-        (sampler != NULL && !element_one_child(ld, sampler, "border_color", &border)) ||
-        (border != NULL && !text_read_color(ld, border, &colour, NULL)))
-        return false;
+    int wrap[2] = {field_choice(ld, sampler, "wrap_s", WRAPS, TEXTURE_WRAP),
+                   field_choice(ld, sampler, "wrap_t", WRAPS, TEXTURE_WRAP)},
+        filter = field_choice(ld, sampler, "magfilter",
+                              "NEAREST NEAREST_MIPMAP_NEAREST NEAREST_MIPMAP_LINEAR LINEAR "
+                              "LINEAR_MIPMAP_NEAREST LINEAR_MIPMAP_LINEAR NONE",
+                              3);
     for (int k = 0; k < 2; k++)
         t->wrap[k] = (enum texture_wrap)(wrap[k] < TEXTURE_BORDER ? wrap[k] : TEXTURE_BORDER);
-    t->nearest = filter == 0 || filter == 3 || filter == 5;
-    bool shows = t->wrap[0] == TEXTURE_BORDER || t->wrap[1] == TEXTURE_BORDER;
-    return !shows || rgb_is_zero(colour) ||
-           fail_at(ld, border, "a <border_color> that is not black is not supported");
+    t->nearest = filter < 3;
+    if (border != NULL)
+        text_read_color(ld, border, &colour, NULL);
+    if ((t->wrap[0] == TEXTURE_BORDER || t->wrap[1] == TEXTURE_BORDER) && !rgb_is_zero(colour))
+        fail_at(ld, border, "a <border_color> that is not black is not supported");
 }
 
-bool texture_get(struct loader *ld, const xmlNode *texture, uint32_t *map, const char **texcoord)
+uint32_t texture_get(struct loader *ld, const xmlNode *texture, const char **texcoord)
 {
     struct scene *s = &ld->scene;
-    struct texture_use use;
+    struct texture_use use = parameter_get_texture(ld, texture);
     struct texture t = {0};
-    uint32_t image;
-    if (!parameter_get_texture(ld, texture, &use) || !get_image(ld, use.image, &image) ||
-        !read_sampler(ld, use.sampler, &t))
-        return false;
+    const struct image *image = get_image(ld, use.image);
     *texcoord = use.texcoord;
-    t.width = s->images[image].width;
-    t.height = s->images[image].height;
-    t.texel = s->images[image].data;
-    for (*map = 1; *map <= s->num_textures; ++*map) {
-        const struct texture *o = &s->textures[*map - 1];
+    read_sampler(ld, use.sampler, &t);
+    if (image == NULL)
+        return 0;
+    t.width = image->width;
+    t.height = image->height;
+    t.texel = image->data;
+    for (uint32_t map = 1; map <= s->num_textures; map++) {
+        const struct texture *o = &s->textures[map - 1];
         if (o->texel == t.texel && o->wrap[0] == t.wrap[0] && o->wrap[1] == t.wrap[1] &&
             o->nearest == t.nearest)
-            return true;
+            return map;
     }
-    struct texture *grown =
-        build_grow(ld, s->textures, sizeof *grown, s->num_textures, &ld->cap_textures);
-    if (grown == NULL)
-        return false;
-    s->textures = grown;
-    grown[s->num_textures++] = t;
-    return true;
+    s->textures = build_grow(ld, s->textures, sizeof *s->textures, s->num_textures);
+    if (!ld->failed)
+        s->textures[s->num_textures++] = t;
+    return s->num_textures;
 }
 
-/* The set that the name is bound to; a file that binds nothing means its first. */
-static bool find_binding(struct loader *ld, const xmlNode *binding, const char *texcoord,
-                         bool *is_bound, uint64_t *set)
+/* The set that the name is bound to; NULL: a file that binds nothing means its first. */
+static const xmlNode *find_binding(const xmlNode *binding, const char *texcoord)
 {
-    *is_bound = false;
-    *set = 0;
-    for (const xmlNode *c = binding != NULL ? element_first_child(binding) : NULL;
-         c != NULL && texcoord != NULL; c = element_next_sibling(c)) {
+    for (const xmlNode *c = element_first_child(binding); c != NULL && texcoord != NULL;
+         c = element_next_sibling(c)) {
         const char *semantic = element_attribute(c, "semantic");
-        if (!element_is(c, "bind_vertex_input") || semantic == NULL ||
-            strcmp(semantic, texcoord) != 0)
-            continue;
-        *is_bound = true;
-        return element_attribute_count_or(ld, c, "input_set", 0, set);
+        if (element_is(c, "bind_vertex_input") && semantic != NULL &&
+            strcmp(semantic, texcoord) == 0)
+            return c;
     }
-    return true;
+    return NULL;
 }
 
-bool texture_find_set(struct loader *ld, const xmlNode *instance, const xmlNode *binding,
-                      const char *texcoord, const struct mesh_group *g, size_t *which)
+size_t texture_find_set(struct loader *ld, const xmlNode *instance, const xmlNode *binding,
+                        const char *texcoord, const struct mesh_group *g)
 {
-    bool is_bound;
-    uint64_t set;
-    *which = 0;
-    if (!find_binding(ld, binding, texcoord, &is_bound, &set))
-        return false;
-    if (g == NULL || g->num_uv == 0)
-        return fail_at(ld, instance, "a texture on a surface without texture coordinates");
-    while (is_bound && *which < g->num_uv && g->uv_set[*which] != set)
-        ++*which;
-    return *which < g->num_uv ||
-           fail_at(ld, binding, "no set %llu of texture coordinates", (unsigned long long)set);
+    const xmlNode *bound = find_binding(binding, texcoord);
+    uint64_t set = bound != NULL ? element_count_or(ld, bound, "input_set", 0) : 0;
+    if (g == NULL || g->num_uv == 0) {
+        fail_at(ld, instance, "a texture on a surface without texture coordinates");
+        return 0;
+    }
+    for (size_t k = 0; k < g->num_uv; k++)
+        if (bound == NULL || g->uv_set[k] == set)
+            return k;
+    fail_at(ld, binding, "no set %llu of texture coordinates", (unsigned long long)set);
+    return 0;
 }

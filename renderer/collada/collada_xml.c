@@ -30,20 +30,14 @@ typedef const xmlError *xml_complaint;
 typedef xmlError *xml_complaint;
 #endif
 
-/* Only the first complaint is kept: those after it are mostly its consequences. */
+/* Of those that follow the first most are its consequences. */
 static void complain(struct loader *ld, xml_complaint error)
 {
-    if (error->level < XML_ERR_ERROR || ld->parse_failed)
-        return;
-    ld->parse_failed = true;
-    if (error->code == XML_ERR_NO_MEMORY) {
+    const char *text = error->message != NULL ? error->message : "malformed XML";
+    if (error->level >= XML_ERR_ERROR && error->code == XML_ERR_NO_MEMORY)
         fail_memory(ld);
-        return;
-    }
-    char text[512];
-    snprintf(text, sizeof text, "%s", error->message != NULL ? error->message : "malformed XML");
-    text[strcspn(text, "\n")] = '\0';
-    fail_line(ld, NULL, error->line, "not well-formed: %s", text);
+    else if (error->level >= XML_ERR_ERROR)
+        fail_line(ld, NULL, error->line, "not well-formed: %.*s", (int)strcspn(text, "\n"), text);
 }
 
 static void parse_error(void *ctx, xml_complaint error)
@@ -68,217 +62,192 @@ static void document_type(void *ctx, const xmlChar *name, const xmlChar *externa
     (void)external;
     (void)system;
     xmlParserCtxt *ctxt = ctx;
-    struct loader *ld = ctxt->_private;
-    if (!ld->parse_failed)
-        fail_line(ld, NULL, ctxt->input->line, "a document type (DOCTYPE) is not accepted");
-    ld->parse_failed = true;
+    fail_line(ctxt->_private, NULL, ctxt->input->line, "a document type (DOCTYPE) is not accepted");
     xmlStopParser(ctxt);
 }
 
-struct reading {
-    struct loader *ld;
-    struct text_input *in;
-};
+/* A comment becomes a blank and its line ends, so that no text is in pieces and a place in one can be told by its line. */
+static void comment(void *ctx, const xmlChar *text)
+{
+    xmlSAX2Characters(ctx, BAD_CAST " ", 1);
+    for (const xmlChar *c = text; *c != '\0'; c++)
+        if (*c == '\n')
+            xmlSAX2Characters(ctx, c, 1);
+}
+
+static void instruction(void *ctx, const xmlChar *target, const xmlChar *text)
+{
+    (void)target;
+    comment(ctx, text != NULL ? text : BAD_CAST "");
+}
 
 /* libxml2 asks for a few thousand bytes at a time, so the text is never in memory as a whole. */
 static int read_some(void *context, char *buffer, int size)
 {
-    const struct reading *r = context;
-    struct text_input *in = r->in;
+    struct text_input *in = context;
     size_t n = (size_t)size;
     if (in->file != NULL) {
         n = fread(buffer, 1, n, in->file);
         if (ferror(in->file))
-            in->failed = !err_set(r->ld->err, "%s: cannot read: %s", r->ld->path, strerror(errno));
+            fail_line(in->ld, NULL, 0, "cannot read: %s", strerror(errno));
     } else {
         n = n < in->size - in->taken ? n : in->size - in->taken;
         memcpy(buffer, in->text + in->taken, n);
     }
     in->taken += n;
     if (in->taken > MAX_FILE_BYTES)
-        in->failed = !err_set(r->ld->err, "%s: larger than %d bytes", r->ld->path, MAX_FILE_BYTES);
-    r->ld->parse_failed |= in->failed; /* what the parser says of it is of no interest */
-    return in->failed ? -1 : (int)n;
+        fail_line(in->ld, NULL, 0, "larger than %d bytes", MAX_FILE_BYTES);
+    return in->ld->failed ? -1 : (int)n;
 }
 
 static bool parse(struct loader *ld, struct document *d, struct text_input *in)
 {
-    struct reading reading = {ld, in};
+    in->ld = ld;
     xmlSetStructuredErrorFunc(ld, library_error); /* of this thread */
     xmlParserCtxt *ctxt = xmlNewParserCtxt();
-    if (ctxt == NULL) {
-        xmlSetStructuredErrorFunc(NULL, NULL);
-        return fail_memory(ld);
+    if (ctxt != NULL) {
+        ctxt->_private = ld;
+        ctxt->sax->startElementNs = element_start;
+        ctxt->sax->internalSubset = document_type;
+        ctxt->sax->serror = parse_error;
+        ctxt->sax->comment = comment;
+        ctxt->sax->processingInstruction = instruction;
+        ctxt->sax->cdataBlock = xmlSAX2Characters;
+        /* HUGE lifts the limit of 10 MB for one text, which large meshes reach; what else it lifts
+         * (depth, entities) is checked here. */
+        d->doc =
+            xmlCtxtReadIO(ctxt, read_some, NULL, in, NULL, NULL, XML_PARSE_NONET | XML_PARSE_HUGE);
     }
-    ctxt->_private = ld;
-    ctxt->sax->startElementNs = element_start;
-    ctxt->sax->internalSubset = document_type;
-    ctxt->sax->serror = parse_error;
-    /* HUGE lifts the limit of 10 MB for one text, which large meshes reach; what else it lifts
-     * (depth, entities) is checked here. */
-    d->doc = xmlCtxtReadIO(ctxt, read_some, NULL, &reading, NULL, NULL,
-                           XML_PARSE_NONET | XML_PARSE_HUGE);
-    if (ctxt->errNo == XML_ERR_NO_MEMORY && !ld->parse_failed)
-        ld->parse_failed = !fail_memory(ld);
-    bool failed = ld->parse_failed;
+    if (ctxt == NULL || ctxt->errNo == XML_ERR_NO_MEMORY)
+        fail_memory(ld);
     xmlFreeParserCtxt(ctxt);
     xmlSetStructuredErrorFunc(NULL, NULL);
-    if (failed)
-        return false;
-    if (d->doc == NULL || xmlDocGetRootElement(d->doc) == NULL)
-        return fail_line(ld, NULL, 1, "not well-formed: no XML document");
-    return true;
+    return (d->doc != NULL && xmlDocGetRootElement(d->doc) != NULL && !ld->failed) ||
+           fail_line(ld, NULL, 1, "not well-formed: no XML document");
 }
 
 /* The survey of the whole document: ids, dialect, and what may not be anywhere. */
 
-static bool is_blank_text(const xmlNode *n)
+static void survey_texts(struct loader *ld, const xmlNode *n)
 {
-    return n->content == NULL || n->content[strspn((const char *)n->content, " \t\r\n")] == '\0';
+    if (element_first_child(n) == NULL)
+        return;
+    for (const xmlNode *c = n->children; c != NULL; c = c->next)
+        if (c->type == XML_TEXT_NODE && c->content[strspn((char *)c->content, " \t\r\n")] != '\0')
+            fail_at(ld, n, "stray text between the elements of <%.60s>", (const char *)n->name);
 }
 
-static bool survey_texts(struct loader *ld, const xmlNode *n)
+/* Whether what is inside is for us to read. */
+static bool survey_element(struct loader *ld, const xmlNode *n, bool *has_cgl)
 {
-    bool has_elements = element_first_child(n) != NULL;
-    for (const xmlNode *c = n->children; c != NULL; c = c->next) {
-        bool is_text = c->type == XML_TEXT_NODE || c->type == XML_CDATA_SECTION_NODE;
-        if (has_elements && is_text && !is_blank_text(c))
-            return fail_at(ld, n, "stray text between the elements of <%.60s>",
-                           (const char *)n->name);
-    }
-    return true;
-}
-
-/* *enter: whether what is inside is for us to read. */
-static bool survey_element(struct loader *ld, xmlNode *n, bool *has_cgl, bool *enter)
-{
-    *enter = true;
     /* Other files may have textures for our meshes. */
     const char *url = element_attribute(n, "url"), *target = element_attribute(n, "target");
     if (ld->num_documents == 1)
         ld->has_textures |= element_is(n, "texture") || (url != NULL && url[0] != '#') ||
                             (target != NULL && target[0] != '#');
-    if (element_is(n, "technique")) {
-        const char *profile = element_attribute(n, "profile");
-        const xmlNode *owner = n->parent->parent;
-        if (profile != NULL && strcmp(profile, "CMU462") == 0)
-            return fail_at(ld, n, "profile 'CMU462' is not supported");
-        if (element_is_own_profile(profile) &&
-            !(element_is(n->parent, "extra") && owner->type == XML_ELEMENT_NODE &&
-              element_is_one_of(owner, "geometry light effect")))
-            return fail_at(ld, n,
-                           "profile '%s' has no meaning here: only in the <extra> of a "
-                           "geometry, light or effect",
-                           profile);
-        if (profile != NULL && strcmp(profile, "CGL") == 0) {
-            if (ld->dialect == DIALECT_COLLADA)
-                return fail_at(ld, n, "profile 'CGL' needs --dialect cgl");
-            *has_cgl = true;
-        }
-        *enter = profile == NULL || element_is_own_profile(profile);
-    } else if (strncmp((const char *)n->name, "profile_", 8) == 0 &&
-               !element_is(n, "profile_COMMON")) {
-        *enter = false;
-    }
-    return !*enter || survey_texts(ld, n);
+    if (element_is(n, "asset") && element_first_child(n->parent) != n)
+        fail_at(ld, n, "<asset> is not the first in <%.60s>", (const char *)n->parent->name);
+    if (!element_is(n, "technique"))
+        return strncmp((const char *)n->name, "profile_", 8) != 0 ||
+               element_is(n, "profile_COMMON");
+    const char *profile = element_attribute(n, "profile");
+    const xmlNode *owner = n->parent->parent;
+    bool is_cgl = profile != NULL && strcmp(profile, "CGL") == 0;
+    if (profile != NULL && strcmp(profile, "CMU462") == 0)
+        fail_at(ld, n, "profile 'CMU462' is not supported");
+    if (element_is_own_profile(profile) &&
+        !(element_is(n->parent, "extra") && owner->type == XML_ELEMENT_NODE &&
+          element_is_one_of(owner, "geometry light effect")))
+        fail_at(ld, n,
+                "profile '%s' has no meaning here: only in the <extra> of a geometry, light or "
+                "effect",
+                profile);
+    if (is_cgl && ld->dialect == DIALECT_COLLADA)
+        fail_at(ld, n, "profile 'CGL' needs --dialect cgl");
+    *has_cgl |= is_cgl;
+    return profile == NULL || element_is_own_profile(profile);
 }
 
-static bool add_id(struct loader *ld, struct document *d, xmlNode *n, size_t *capacity)
+static void add_id(struct loader *ld, struct document *d, const xmlNode *n)
 {
-    const char *id = element_attribute(n, "id");
+    const xmlChar *id = BAD_CAST element_attribute(n, "id");
     if (id == NULL)
-        return true;
-    struct id_entry *grown = build_grow(ld, d->ids, sizeof *grown, d->num_ids, capacity);
-    if (grown == NULL)
-        return false;
-    d->ids = grown;
-    d->ids[d->num_ids++] = (struct id_entry){id, n};
-    return true;
+        return;
+    bool is_first = xmlHashLookup(d->ids, id) == NULL;
+    if ((is_first ? xmlHashAddEntry(d->ids, id, (xmlNode *)n)
+                  : xmlHashUpdateEntry(d->ids, id, d, NULL)) != 0)
+        fail_memory(ld);
 }
 
-static bool survey(struct loader *ld, struct document *d, bool *has_cgl)
+static void survey(struct loader *ld, struct document *d, const xmlNode *n, int depth,
+                   bool *has_cgl)
 {
-    xmlNode *root = xmlDocGetRootElement(d->doc), *n = root;
-    size_t capacity = 0;
-    int depth = 0;
-    while (n != NULL) {
-        bool enter;
-        if (depth > MAX_XML_DEPTH)
-            return fail_at(ld, n, "elements nested deeper than %d", MAX_XML_DEPTH);
-        if (!survey_element(ld, n, has_cgl, &enter) || !add_id(ld, d, n, &capacity))
-            return false;
-        xmlNode *next = enter ? element_first_child(n) : NULL;
-        if (next != NULL)
-            depth++;
-        while (next == NULL && n != root) {
-            next = element_next_sibling(n);
-            if (next == NULL) {
-                n = n->parent;
-                depth--;
-            }
-        }
-        n = next;
-    }
-    if (d->num_ids > 0)
-        qsort(d->ids, d->num_ids, sizeof *d->ids, element_compare_ids);
-    return true;
+    if (depth > MAX_XML_DEPTH)
+        fail_at(ld, n, "elements nested deeper than %d", MAX_XML_DEPTH);
+    add_id(ld, d, n);
+    if (!survey_element(ld, n, has_cgl))
+        return;
+    survey_texts(ld, n);
+    for (const xmlNode *c = element_first_child(n); c != NULL && !ld->failed;
+         c = element_next_sibling(c))
+        survey(ld, d, c, depth + 1, has_cgl);
 }
 
 static bool check_root(struct loader *ld, const xmlNode *root)
 {
-    static const char *const NAMESPACES[] = {"http://www.collada.org/2005/11/COLLADASchema",
-                                             "http://www.collada.org/2008/03/COLLADASchema"};
-    if (strcmp((const char *)root->name, "COLLADA") != 0)
-        return fail_at(ld, root, "the root is <%.60s>, not <COLLADA>", (const char *)root->name);
-    if (root->ns != NULL && strcmp((const char *)root->ns->href, NAMESPACES[0]) != 0 &&
-        strcmp((const char *)root->ns->href, NAMESPACES[1]) != 0)
-        return fail_at(ld, root, "unknown COLLADA namespace '%.200s'",
-                       (const char *)root->ns->href);
+    static const char SCHEMAS[] = "http://www.collada.org/2005/11/COLLADASchema "
+                                  "http://www.collada.org/2008/03/COLLADASchema";
     const char *version = element_attribute(root, "version");
+    if (strcmp((const char *)root->name, "COLLADA") != 0)
+        fail_at(ld, root, "the root is <%.60s>, not <COLLADA>", (const char *)root->name);
+    if (root->ns != NULL && element_place_among((const char *)root->ns->href, SCHEMAS) < 0)
+        fail_at(ld, root, "unknown COLLADA namespace '%.200s'", (const char *)root->ns->href);
     if (version == NULL || (strncmp(version, "1.4", 3) != 0 && strncmp(version, "1.5", 3) != 0))
-        return fail_at(ld, root, "COLLADA version '%.60s' is not supported: only 1.4 and 1.5 are",
-                       version != NULL ? version : "(none)");
-    return true;
+        fail_at(ld, root, "COLLADA version '%.60s' is not supported: only 1.4 and 1.5 are",
+                version != NULL ? version : "(none)");
+    return !ld->failed;
 }
 
 /* 0 for another program. */
 static double blender_version(const xmlNode *root)
 {
-    const xmlNode *asset = element_child_named(root, "asset"),
-                  *by = asset != NULL ? element_child_named(asset, "contributor") : NULL,
-                  *tool = by != NULL ? element_child_named(by, "authoring_tool") : NULL;
-    const xmlNode *text = tool != NULL ? tool->children : NULL;
+    const xmlNode *by = element_child(element_child(root, "asset"), "contributor"),
+                  *tool = element_child(by, "authoring_tool"),
+                  *text = tool != NULL ? tool->children : NULL;
     bool is_blender = text != NULL && text->content != NULL &&
                       strncmp((const char *)text->content, "Blender ", 8) == 0;
     return is_blender ? strtod((const char *)text->content + 8, NULL) : 0;
 }
 
-bool xml_open(struct loader *ld, const char *path, struct text_input *in, struct document **out)
+const struct document *xml_open(struct loader *ld, const char *path, struct text_input *in)
 {
     const char *main_path = ld->path;
     bool has_cgl = false;
-    struct document *d = calloc(1, sizeof *d), **grown = NULL;
-    if (d != NULL)
-        grown =
-            build_grow(ld, ld->documents, sizeof(void *), ld->num_documents, &ld->cap_documents);
-    if (grown == NULL) {
+    struct document *d = calloc(1, sizeof *d);
+    ld->documents = build_grow(ld, ld->documents, sizeof(void *), ld->num_documents);
+    if (ld->failed || d == NULL) {
         free(d);
-        return fail_memory(ld);
+        fail_memory(ld);
+        return NULL;
     }
-    ld->documents = grown;
-    ld->documents[ld->num_documents++] = *out = d;
-    d->path = strdup(path);
-    if (d->path == NULL)
-        return fail_memory(ld);
+    ld->documents[ld->num_documents++] = d;
     d->is_file = in->file != NULL;
+    d->path = strdup(path);
+    d->ids = xmlHashCreate(0);
+    if (d->path == NULL || d->ids == NULL) {
+        fail_memory(ld);
+        return NULL;
+    }
     ld->path = d->path;
-    if (!parse(ld, d, in))
-        return false;
+    bool parsed = parse(ld, d, in);
     ld->path = main_path;
+    if (!parsed)
+        return NULL;
     d->doc->_private = d;
     const xmlNode *root = xmlDocGetRootElement(d->doc);
-    if (!check_root(ld, root) || !survey(ld, d, &has_cgl))
-        return false;
+    if (!check_root(ld, root))
+        return NULL;
+    survey(ld, d, root, 0, &has_cgl);
     if (ld->num_documents == 1)
         ld->blender_version = blender_version(root);
     if (ld->dialect == DIALECT_AUTO) {
@@ -288,5 +257,5 @@ bool xml_open(struct loader *ld, const char *path, struct text_input *in, struct
             !has_cgl && (ld->blender_version == 2.72 || ld->blender_version == 2.74);
         ld->dialect = has_cgl || ld->is_course_export ? DIALECT_CGL : DIALECT_COLLADA;
     }
-    return true;
+    return ld->failed ? NULL : d;
 }

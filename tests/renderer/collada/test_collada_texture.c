@@ -178,9 +178,9 @@ cases[] = {WITH(vertices, ""), NULL}, WITH(image, "<image id='i'/>"),
     "'m': reflectance outside [0,1] in its texture"
 }
 , WITH(sampler, "<wrap_s>MIRROR_ONCE</wrap_s>"),
-    "scene.dae:3: <wrap_s> 'MIRROR_ONCE' is not supported"
+    "scene.dae:3: <wrap_s> is 'MIRROR_ONCE', not one of: WRAP"
 }
-, WITH(sampler, "<magfilter>CUBIC</magfilter>"), "<magfilter> 'CUBIC' is not supported"
+, WITH(sampler, "<magfilter>CUBIC</magfilter>"), "<magfilter> is 'CUBIC', not one of: NEAREST"
 }
 , WITH(sampler, "<wrap_t>BORDER</wrap_t><border_color>1 0 0 1</border_color>"),
     "<border_color> that is not black"
