@@ -15,15 +15,20 @@ void philox4x32(const uint32_t counter[4], const uint32_t key[2], int rounds, ui
 
 void sobol_point(uint32_t index, uint32_t x[4])
 {
-    sobolv(reverse_bitsv(index), x);
+    sobolv(index, x);
+    for (int i = 0; i < 4; i++)
+        x[i] = vu_reverse_bits(x[i]);
 }
 
 struct sample4 sampler_draw(const struct sampler *s, uint32_t pixel, uint32_t sample,
                             uint32_t vertex, uint32_t purpose)
 {
     const struct philox_keys keys = philox_keys(s->seed);
+    struct sobol_keys block = {0};
     struct sample4 out;
-    drawv(s->kind, &keys, pixel, sample, vertex, purpose, out.u);
+    if (s->kind == SAMPLER_SOBOL)
+        block = sobol_keys(&keys, vertex, purpose);
+    drawv(s->kind, &keys, &block, pixel, sample, vertex, purpose, 4, out.u);
     return out;
 }
 

@@ -6,8 +6,8 @@
  *
  * Sobol: for each (pixel, vertex, purpose) the samples 0, 1, 2, ... are points of one digital
  * sequence in 4 dimensions, scrambled as a nested uniform scrambling would [Owen95] by a hash
- * [Burley20]; scrambles and order of the points are chosen by Philox from (seed, pixel, vertex,
- * purpose), so blocks are padded and pixels are decorrelated. Each number is uniform, but the
+ * [Burley20]; scrambles and order of the points are chosen by hashes of the pixel under keys that
+ * Philox makes of (seed, vertex, purpose), so blocks are padded and pixels are decorrelated. Each number is uniform, but the
  * samples of one pixel depend on each other: their spread is no measure of the error of their mean.
  * What is promised of samples k 2^m .. (k+1) 2^m - 1 of a block, for every k:
  * - u[0..1] and u[2..3] are (0,m,2)-nets in base 2: one point in each box of area 2^-m;

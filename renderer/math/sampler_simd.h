@@ -43,48 +43,39 @@ INLINE void philoxv(vu pixel, vu sample, uint32_t vertex, uint32_t purpose,
     out[3] = vu_of(c3);
 }
 
-INLINE vu reverse_bitsv(vu x)
-{
-    x = x << 16 | x >> 16;
-    x = (x & 0x00FF00FFu) << 8 | (x >> 8 & 0x00FF00FFu);
-    x = (x & 0x0F0F0F0Fu) << 4 | (x >> 4 & 0x0F0F0F0Fu);
-    x = (x & 0x33333333u) << 2 | (x >> 2 & 0x33333333u);
-    return (x & 0x55555555u) << 1 | (x >> 1 & 0x55555555u);
-}
-
-/* Bit places whose number has bit k set. */
+/* Bits of a number, counted from the lowest, whose place has bit k clear. */
 #define PLACES(k)                                                                                  \
-    ((k) == 0   ? 0xAAAAAAAAu                                                                      \
-     : (k) == 1 ? 0xCCCCCCCCu                                                                      \
-     : (k) == 2 ? 0xF0F0F0F0u                                                                      \
-     : (k) == 3 ? 0xFF00FF00u                                                                      \
-                : 0xFFFF0000u)
+    ((k) == 0   ? 0x55555555u                                                                      \
+     : (k) == 1 ? 0x33333333u                                                                      \
+     : (k) == 2 ? 0x0F0F0F0Fu                                                                      \
+     : (k) == 3 ? 0x00FF00FFu                                                                      \
+                : 0x0000FFFFu)
 
-/* P times a vector whose first element is the top bit. By Lucas' theorem P is a Kronecker product of
+/* P times a vector whose first element is the lowest bit. By Lucas' theorem P is a Kronecker product of
  * five matrices (1 1; 0 1), one for each bit of the place. */
 INLINE vu pascal_2v(vu x)
 {
     for (int k = 0; k < 5; k++)
-        x ^= x << (1 << k) & PLACES(k);
+        x ^= x >> (1 << k) & PLACES(k);
     return x;
 }
 
-/* U times a vector of 16 field elements of two bits. The like product of matrices (1 w^(2^k); 0 1),
- * where the exponents 1, 2, 4, 8 are 1, 2, 1, 2 modulo 3. */
+/* U times a vector of 16 field elements of two bits, a + b w with a in the lower. The like product of
+ * matrices (1 w^(2^k); 0 1), where the exponents 1, 2, 4, 8 are 1, 2, 1, 2 modulo 3. */
 INLINE vu pascal_4v(vu x)
 {
     for (int k = 0; k < 4; k++) {
-        vu high = x >> 1 & 0x55555555u, low = x & 0x55555555u, sum = high ^ low;
-        vu times = k % 2 == 0 ? low << 1 | sum : sum << 1 | high;
-        x ^= times << (2 << k) & PLACES(k + 1);
+        vu a = x & PLACES(0), b = x >> 1 & PLACES(0), sum = a ^ b;
+        vu times = k % 2 == 0 ? b | sum << 1 : sum | a << 1;
+        x ^= times >> (2 << k) & PLACES(k + 1);
     }
     return x;
 }
 
-/* sobol_point() of the number with these bits from the lowest to the highest. */
-INLINE void sobolv(vu reversed, vu x[4])
+/* sobol_point() with the lowest bit worth 1/2. */
+INLINE void sobolv(vu index, vu x[4])
 {
-    x[0] = reversed;
+    x[0] = index;
     x[1] = pascal_2v(x[0]);
     x[2] = pascal_4v(x[0]);
     x[3] = pascal_2v(x[2]);
@@ -102,22 +93,50 @@ INLINE vu scramble_upwardsv(vu x, vu seed)
     return x;
 }
 
-/* sampler_draw() */
-INLINE void drawv(enum sampler_kind kind, const struct philox_keys *keys, vu pixel, vu sample,
-                  uint32_t vertex, uint32_t purpose, vf u[4])
+/* A permutation of the numbers of 32 bits in which each bit of x changes half of the result [Wellons18]. */
+INLINE vu hash_bitsv(vu x)
+{
+    x ^= x >> 16;
+    x *= 0x7FEB352Du;
+    x ^= x >> 15;
+    x *= 0x846CA68Bu;
+    return x ^ x >> 16;
+}
+
+/* What all pixels have in common of a (vertex, purpose) under Sobol's sampler. */
+struct sobol_keys {
+    uint32_t order, scramble[4];
+};
+
+static inline struct sobol_keys sobol_keys(const struct philox_keys *keys, uint32_t vertex,
+                                           uint32_t purpose)
+{
+    struct sobol_keys k;
+    vu out[2][4];
+    for (uint32_t i = 0; i < 2; i++)
+        philoxv(vu_set(0), vu_set(i), vertex, purpose, keys, PHILOX_ROUNDS, out[i]);
+    k.order = (uint32_t)LANE(out[0][0], 0);
+    for (int i = 0; i < 4; i++)
+        k.scramble[i] = (uint32_t)LANE(out[1][i], 0);
+    return k;
+}
+
+/* The first `used` numbers of sampler_draw(); the others are not set. block: of the vertex and purpose, which
+ * independent numbers do not use. */
+INLINE void drawv(enum sampler_kind kind, const struct philox_keys *keys,
+                  const struct sobol_keys *block, vu pixel, vu sample, uint32_t vertex,
+                  uint32_t purpose, int used, vf u[4])
 {
     vu x[4];
     if (kind == SAMPLER_INDEPENDENT) {
         philoxv(pixel, sample, vertex, purpose, keys, PHILOX_ROUNDS, x);
     } else {
-        vu order[4], scramble[4];
-        philoxv(pixel, vu_set(0), vertex, purpose, keys, PHILOX_ROUNDS, order);
-        philoxv(pixel, vu_set(1), vertex, purpose, keys, PHILOX_ROUNDS, scramble);
-        sobolv(scramble_upwardsv(reverse_bitsv(sample), order[0]), x);
-        for (int i = 0; i < 4; i++)
-            x[i] = reverse_bitsv(scramble_upwardsv(reverse_bitsv(x[i]), scramble[i]));
+        vu order = hash_bitsv(pixel ^ block->order);
+        sobolv(vu_reverse_bits(scramble_upwardsv(vu_reverse_bits(sample), order)), x);
+        for (int i = 0; i < used; i++)
+            x[i] = vu_reverse_bits(scramble_upwardsv(x[i], hash_bitsv(pixel ^ block->scramble[i])));
     }
-    for (int i = 0; i < 4; i++)
+    for (int i = 0; i < used; i++)
         u[i] = vf_of_int((vi)(x[i] >> 8)) * 0x1p-24f;
 }
 

@@ -14,6 +14,7 @@
  *   front_order, pick       the lanes of a mask, in order, and the numbers in that order: brings them to the front
  *   store_flags             a mask as bytes of 0 or 1
  *   spread_flags            such bytes for the lanes of a mask alone, in order: as bits of these lanes
+ *   vu_reverse_bits         the lowest bit becomes the highest
  *   vw_of, vu_of, vw_mul, vw_high, vw_xor
  *                           numbers of 32 bits in lanes of 64, for products of full length: low halves count, high ones
  *                           may hold anything

@@ -120,6 +120,10 @@ INLINE vf pick(vf a, vi order)
 {
     return (vf)_mm256_permutevar8x32_ps((__m256)a, (__m256i)order);
 }
+INLINE vi shuffle_bytes(vi table, vi which)
+{
+    return (vi)_mm256_shuffle_epi8((__m256i)table, (__m256i)which);
+}
 INLINE unsigned spread_flags(const void *flags, unsigned mask)
 {
     uint64_t bytes;
@@ -223,6 +227,10 @@ INLINE vf pick(vf a, vi order)
     return (vf){a[order[0]], a[order[1]], a[order[2]], a[order[3]],
                 a[order[4]], a[order[5]], a[order[6]], a[order[7]]};
 }
+INLINE vi shuffle_bytes(vi table, vi which)
+{
+    BY_HALVES_INT(_mm_shuffle_epi8, table, which);
+}
 INLINE unsigned spread_flags(const void *flags, unsigned mask)
 {
     const unsigned char *flag = flags;
@@ -247,6 +255,18 @@ INLINE void store_flags(void *flags, vi mask)
 {
     const uint64_t bytes = bytes_of(bits(mask));
     memcpy(flags, &bytes, sizeof bytes);
+}
+
+/* Each byte turned by its halves, which are looked up, and the bytes of each number turned. */
+INLINE vu vu_reverse_bits(vu a)
+{
+    const vi nibbles = {0x0C040800, 0x0E060A02, 0x0D050901, 0x0F070B03,
+                        0x0C040800, 0x0E060A02, 0x0D050901, 0x0F070B03};
+    const vi bytes = {0x00010203, 0x04050607, 0x08090A0B, 0x0C0D0E0F,
+                      0x00010203, 0x04050607, 0x08090A0B, 0x0C0D0E0F};
+    vi low = shuffle_bytes(nibbles << 4, (vi)a & 0x0F0F0F0F);
+    vi high = shuffle_bytes(nibbles, (vi)(a >> 4) & 0x0F0F0F0F);
+    return (vu)shuffle_bytes(low | high, bytes);
 }
 
 #ifdef __AVX512F__

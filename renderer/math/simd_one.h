@@ -99,6 +99,14 @@ INLINE void store_flags(void *flags, vi mask)
 {
     *(unsigned char *)flags = mask & 1;
 }
+INLINE vu vu_reverse_bits(vu a)
+{
+    a = a << 16 | a >> 16;
+    a = (a & 0x00FF00FFu) << 8 | (a >> 8 & 0x00FF00FFu);
+    a = (a & 0x0F0F0F0Fu) << 4 | (a >> 4 & 0x0F0F0F0Fu);
+    a = (a & 0x33333333u) << 2 | (a >> 2 & 0x33333333u);
+    return (a & 0x55555555u) << 1 | (a >> 1 & 0x55555555u);
+}
 INLINE vw vw_of(vu a)
 {
     return a;

@@ -228,9 +228,11 @@ static void connect_light(const struct integrator *it, struct batch *b, int n, i
     if (simple)
         what.lamp = lamp_of(it->lights, what.light);
     const int most = BATCH_LANES / LANES / what.num * LANES;
+    const int used = !what.chosen && light->kind == LIGHT_TRIANGLES ? 3 : 4;
     for (int first = 0; first < n; first += most) {
         const int end = n - first < most ? n : first + most;
-        draw_numbers(it, b, first, end, vertex + 1, what.purpose, what.num);
+        draw_numbers(it, b, first, end,
+                     (struct draws){vertex + 1, what.purpose, what.num, .used = used});
         if (simple)
             sample_lamp_rows(b, first, end, &what);
         int rays = simple ? connect_rows(it, b, first, end, &what, true)
@@ -245,7 +247,7 @@ static void connect_light(const struct integrator *it, struct batch *b, int n, i
 static void choose(const struct integrator *it, struct batch *b, int n, int vertex,
                    uint32_t purpose, bool only_delta)
 {
-    draw_numbers(it, b, 0, n, vertex + 1, purpose, 1);
+    draw_numbers(it, b, 0, n, (struct draws){vertex + 1, purpose, 1, .used = 2});
     for (int k = 0; k < n; k += LANES)
         for (unsigned mask = b->goes_on[k / LANES]; mask; mask &= mask - 1) {
             int i = k + __builtin_ctz(mask);
@@ -263,7 +265,7 @@ static __attribute__((noinline)) void connect_hemisphere(const struct integrator
 {
     const struct scene *s = it->scene;
     int rays = 0;
-    draw_numbers(it, b, 0, n, vertex + 1, purpose, 1);
+    draw_numbers(it, b, 0, n, (struct draws){vertex + 1, purpose, 1, .used = 2});
     for (int k = 0; k < n; k += LANES) {
         unsigned mask = scattering(b, k);
         struct vertexv v;

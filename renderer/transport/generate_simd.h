@@ -26,7 +26,8 @@ static void generate(const struct integrator *it, struct batch *b, int n)
         vf_store_any(b->slot_pixel + k, vf_load_any(b->pixel + k));
         vf_store_any(b->slot_sample + k, vf_load_any(b->sample + k));
     }
-    draw_numbers(it, b, 0, n, 0, PURPOSE_CAMERA, 1);
+    draw_numbers(it, b, 0, n,
+                 (struct draws){0, PURPOSE_CAMERA, 1, .used = c->lens_radius > 0 ? 4 : 2});
     for (int k = 0; k < n; k += LANES) {
         vf u[4];
         load_numbers(b, k / LANES, u);

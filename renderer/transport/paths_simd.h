@@ -28,33 +28,47 @@ INLINE void pick_rgb(struct rgbs *a, int i, rgbv c, vi order)
     rgb_store(a, i, (rgbv){pick(c.r, order), pick(c.g, order), pick(c.b, order)});
 }
 
+/* Which numbers of which vertices' purposes, the first of them each. */
+struct draws {
+    int vertex;
+    uint32_t purpose;
+    int num;  /* purposes, one after the other */
+    int used; /* numbers, at least 2 */
+};
+
 INLINE void draw_rows(struct batch *b, enum sampler_kind kind, const struct philox_keys *keys,
-                      int first, int end, int vertex, uint32_t purpose, int num)
+                      int first, int end, const struct draws *what, int used)
 {
-    for (int k = first, j = 0; k < end; k += LANES) {
-        vu pixel = (vu)vi_load_any(b->slot_pixel + k), sample = (vu)vi_load_any(b->slot_sample + k);
-        for (int i = 0; i < num; i++, j += LANES) {
+    for (int i = 0; i < what->num; i++) {
+        const uint32_t vertex = (uint32_t)what->vertex, purpose = what->purpose + (uint32_t)i;
+        struct sobol_keys block = {0};
+        if (kind == SAMPLER_SOBOL)
+            block = sobol_keys(keys, vertex, purpose);
+        for (int k = first, row = i; k < end; k += LANES, row += what->num) {
+            vu pixel = (vu)vi_load_any(b->slot_pixel + k);
+            vu sample = (vu)vi_load_any(b->slot_sample + k);
             vf u[4];
-            drawv(kind, keys, pixel, sample, (uint32_t)vertex, purpose + (uint32_t)i, u);
-            for (int d = 0; d < 4; d++)
-                vf_store_any(b->numbers[d] + j, u[d]);
+            drawv(kind, keys, &block, pixel, sample, vertex, purpose, used, u);
+            for (int d = 0; d < used; d++)
+                vf_store_any(b->numbers[d] + LANES * row, u[d]);
         }
     }
 }
 
-/* The numbers of `num` purposes for the lanes first .. end, LANES after LANES, into rows of
- * b->numbers. A loop of its own, short enough that the machine works on several rounds of it at once. */
+/* Numbers for the lanes first .. end, LANES after LANES, into rows of b->numbers. A loop of its own, short enough that
+ * the machine works on several rounds of it at once; numbers of a Sobol sequence cost time one by one. */
 static __attribute__((noinline)) void draw_numbers(const struct integrator *it, struct batch *b,
-                                                   int first, int end, int vertex, uint32_t purpose,
-                                                   int num)
+                                                   int first, int end, struct draws what)
 {
     const struct philox_keys keys = philox_keys(it->opt.sampler.seed);
-    switch (it->opt.sampler.kind) {
-    case SAMPLER_INDEPENDENT:
-        draw_rows(b, SAMPLER_INDEPENDENT, &keys, first, end, vertex, purpose, num);
-        break;
-    case SAMPLER_SOBOL: draw_rows(b, SAMPLER_SOBOL, &keys, first, end, vertex, purpose, num); break;
-    }
+    if (it->opt.sampler.kind == SAMPLER_INDEPENDENT)
+        draw_rows(b, SAMPLER_INDEPENDENT, &keys, first, end, &what, 4);
+    else if (what.used == 2)
+        draw_rows(b, SAMPLER_SOBOL, &keys, first, end, &what, 2);
+    else if (what.used == 3)
+        draw_rows(b, SAMPLER_SOBOL, &keys, first, end, &what, 3);
+    else
+        draw_rows(b, SAMPLER_SOBOL, &keys, first, end, &what, 4);
 }
 
 INLINE void load_numbers(const struct batch *b, int row, vf u[4])

@@ -5,12 +5,22 @@
 #include "paths_simd.h"
 #include "renderer/scene/shape_simd.h"
 
-/* Chance to go on from this vertex (0: the first that the camera sees). */
+#include <limits.h>
+
+/* The first vertex (0: what the camera sees) at which roulette may end a path. */
+INLINE int first_at_risk(const struct integrator_options *o)
+{
+    return o->roulette == ROULETTE_OFF ? INT_MAX : o->roulette == ROULETTE_FIXED ? 1 : 2;
+}
+
+/* Chance to go on from this vertex. */
 INLINE vf survival(const struct integrator_options *o, int vertex, rgbv throughput, vf eta2)
 {
-    if (o->roulette == ROULETTE_THROUGHPUT && vertex >= 2)
-        return vf_min(vf_set(1), roulette_factor(o) * (rgb_maxv(throughput) * eta2));
-    return vf_set(o->roulette == ROULETTE_FIXED && vertex >= 1 ? o->survival : 1);
+    if (vertex < first_at_risk(o))
+        return vf_set(1);
+    if (o->roulette == ROULETTE_FIXED)
+        return vf_set(o->survival);
+    return vf_min(vf_set(1), roulette_factor(o) * (rgb_maxv(throughput) * eta2));
 }
 
 /* The paths of the mask are over. */
@@ -28,7 +38,8 @@ static int scatter(const struct integrator *it, struct batch *b, int n, int vert
 {
     const vf zero = vf_set(0);
     int kept = 0;
-    draw_numbers(it, b, 0, n, vertex + 1, PURPOSE_BSDF, 1);
+    const bool two = it->records->only_diffuse && vertex < first_at_risk(&it->opt);
+    draw_numbers(it, b, 0, n, (struct draws){vertex + 1, PURPOSE_BSDF, 1, .used = two ? 2 : 4});
     for (int k = 0; k < n; k += LANES) {
         unsigned there = lanes_there(k, n), mask = b->goes_on[k / LANES];
         if (!mask) {
