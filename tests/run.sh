@@ -52,7 +52,11 @@ for program in "${programs[@]}"; do
         f=$((f + 1))
         echo "$name: died with status $status"
     fi
-    [ "$f" -gt 0 ] && cat "$log/$name.out"
+    if [ "$f" -gt 0 ]; then
+        cat "$log/$name.out"
+        sed -n "s/^\[ *FAILED *\] \([a-z]\)/$name: \1/p" "$log/$name.first" >>"$log/failed"
+        grep -q "^$name: " "$log/failed" || echo "$name: died with status $status" >>"$log/failed"
+    fi
     [ "$s" -gt 0 ] && grep -i "skip" "$log/$name.out"
     printf '%-24s %3d passed, %d failed, %d skipped  (%d s)\n' "$name" "$p" "$f" "$s" "$seconds"
     passed=$((passed + p)) failed=$((failed + f)) skipped=$((skipped + s))
@@ -68,12 +72,20 @@ for name in end_to_end lint docs fuzz; do
         f=$((f + 1))
         echo "$name: died with status $status"
     fi
-    [ "$f" -gt 0 ] && cat "$log/$name.out"
+    if [ "$f" -gt 0 ]; then
+        cat "$log/$name.out"
+        grep '^not ok ' "$log/$name.out" >>"$log/failed" || echo "$name: died with status $status" >>"$log/failed"
+    fi
     [ "$s" -gt 0 ] && grep '^skip ' "$log/$name.out"
     printf '%-24s %3d passed, %d failed, %d skipped  (%d s)\n' "$name" "$p" "$f" "$s" "$seconds"
     passed=$((passed + p)) failed=$((failed + f)) skipped=$((skipped + s))
 done
 
+# Once more and together: a log is read from its end.
+if [ -s "$log/failed" ]; then
+    echo "failed:"
+    sort -u "$log/failed"
+fi
 if [ $skipped -gt 0 ]; then
     echo "$passed passed, $failed failed, $skipped skipped"
 else
