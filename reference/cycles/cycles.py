@@ -122,7 +122,7 @@ def build(dump):
             m["kind"], m["reflectance"] = "diffuse", [0.0, 0.0, 0.0]
             m.pop("reflectance_map", None)
     upper_half = (dump["environment"] or {}).get("kind") == "upper_half"
-    if bpy.app.version >= (3, 5, 0) and (dump["lights"] or upper_half) and any(m["kind"] == "microfacet" for m in dump["materials"]):
+    if bpy.app.version >= (3, 5, 0) and (dump["lights"] or upper_half) and any(m["kind"] in ("microfacet", "plastic") for m in dump["materials"]):
         raise ValueError("rough metals under lights without area need Blender 3.4: Glossy of later versions has correlated shadowing")
     materials = [add_material(m) for m in dump["materials"]]
     for m in dump["meshes"]:

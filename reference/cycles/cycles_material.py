@@ -172,8 +172,16 @@ def diffuse(nodes, m):
                       0.0).outputs[0]
 
 
+def plastic(nodes, m):
+    surface = diffuse(nodes, m)
+    for lobe, color in ((microfacet, m["specular"]), (mirror, m["mirror"])):
+        if any(color):
+            surface = nodes.add_shaders(surface, lobe(nodes, {**m, "reflectance": color}))
+    return surface
+
+
 SCATTERING = {"diffuse": diffuse, "mirror": mirror, "refraction": dielectric, "glass": dielectric,
-              "microfacet": microfacet}
+              "microfacet": microfacet, "plastic": plastic}
 
 
 def add_material(m):

@@ -13,8 +13,10 @@
  * other microfacet is made of random facets (cycles_material.py). */
 static bool needs_facets(const struct material *m)
 {
-    return m->kind == MATERIAL_MICROFACET && (m->microfacet != MICROFACET_GGX || !m->separable ||
-                                              m->conductor || m->alpha > 1 || m->alpha < 0.01f);
+    const bool shines = m->kind == MATERIAL_PLASTIC && !rgb_is_zero(m->specular);
+    return (m->kind == MATERIAL_MICROFACET || shines) &&
+           (m->microfacet != MICROFACET_GGX || !m->separable || m->conductor || m->alpha > 1 ||
+            m->alpha < 0.01f);
 }
 
 static const char *unsampled_light(const struct scene *s)
@@ -35,11 +37,10 @@ static const char *unsampled_light(const struct scene *s)
 }
 
 /* The kinds that cycles_material.py makes, by its names. */
-static const char *const KIND[NUM_MATERIAL_KINDS] = {[MATERIAL_DIFFUSE] = "diffuse",
-                                                     [MATERIAL_MIRROR] = "mirror",
-                                                     [MATERIAL_REFRACTION] = "refraction",
-                                                     [MATERIAL_GLASS] = "glass",
-                                                     [MATERIAL_MICROFACET] = "microfacet"};
+static const char *const KIND[NUM_MATERIAL_KINDS] = {
+    [MATERIAL_DIFFUSE] = "diffuse",       [MATERIAL_MIRROR] = "mirror",
+    [MATERIAL_REFRACTION] = "refraction", [MATERIAL_GLASS] = "glass",
+    [MATERIAL_MICROFACET] = "microfacet", [MATERIAL_PLASTIC] = "plastic"};
 
 /* Adds the maps of a material that has some. */
 static json_t *with_maps(json_t *o, const struct scene *s, const struct material *m,
@@ -74,12 +75,15 @@ static json_t *reflection(const struct material *m)
                          (double)m->alpha, "separable", m->separable, "facets", needs_facets(m),
                          "eta", m->conductor ? cycles_rgb(m->eta) : json_null(), "k",
                          m->conductor ? cycles_rgb(m->k) : json_null());
-    if (json_object_update_missing(o, more) != 0) {
-        json_decref(o);
-        o = NULL;
-    }
+    bool ok = json_object_update_missing(o, more) == 0;
+    if (m->kind == MATERIAL_PLASTIC)
+        ok = json_object_set_new(o, "specular", cycles_rgb(m->specular)) == 0 &&
+             json_object_set_new(o, "mirror", cycles_rgb(m->mirror)) == 0 && ok;
     json_decref(more);
-    return o;
+    if (ok)
+        return o;
+    json_decref(o);
+    return NULL;
 }
 
 json_t *cycles_materials(const struct scene *s, const char *dump, struct err *e)

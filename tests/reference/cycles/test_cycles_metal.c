@@ -12,7 +12,14 @@ static const double ETA[3] = {.2, .4, 1.4}, K[3] = {3.3, 2.4, 1.8}, REFLECTANCE[
 struct metal {
     bool ggx, separable, conductor;
     double alpha;
+    double diffuse,
+        mirror; /* both 0: metal; else plastic, and the rest of REFLECTANCE is the highlight's */
 };
+
+static bool is_plastic(const struct metal *a)
+{
+    return a->diffuse + a->mirror > 0;
+}
 
 /* Noise: Cycles stratifies the samples of its own closure. */
 static bool a_closure(const struct metal *a)
@@ -39,6 +46,12 @@ static uint32_t build_metal(struct scene *s, const struct metal *a)
     m->alpha = (float)a->alpha;
     m->eta = (rgb){.2f, .4f, 1.4f};
     m->k = (rgb){3.3f, 2.4f, 1.8f};
+    if (is_plastic(a)) {
+        m->kind = MATERIAL_PLASTIC;
+        m->specular = rgb_scale(m->reflectance, (float)(1 - a->diffuse - a->mirror));
+        m->mirror = rgb_scale(m->reflectance, (float)a->mirror);
+        m->reflectance = rgb_scale(m->reflectance, (float)a->diffuse);
+    }
     return i;
 }
 
@@ -63,6 +76,11 @@ static struct albedo tabulate(const struct metal *a)
                              : optics_metal_albedo(&o, c * c) * (a->conductor ? 1 : REFLECTANCE[k]);
         }
     }
+    /* What is not the highlight's is reflected evenly, or as an image of white. */
+    const double other = a->diffuse + a->mirror;
+    for (int k = 0; k < 3; k++)
+        for (int i = 0; i <= TABLE && is_plastic(a); i++)
+            t.at[k][i] = (1 - other) * t.at[k][i] + other * REFLECTANCE[k];
     return t;
 }
 
@@ -98,23 +116,28 @@ static void check_ball(struct probe *f, struct metal is, struct metal is_not, do
 
 TEST_WITH(closure_in_white, probe_setup, probe_teardown)
 {
-    check_ball(*state, (struct metal){true, true, false, .5},
-               (struct metal){true, false, false, .5}, 3e-4);
+    check_ball(*state, (struct metal){true, true, false, .5, 0, 0},
+               (struct metal){true, false, false, .5, 0, 0}, 3e-4);
 }
 TEST_WITH(ggx_facets_in_white, probe_setup, probe_teardown)
 {
-    check_ball(*state, (struct metal){true, false, true, .5}, (struct metal){true, true, true, .5},
-               3e-4);
+    check_ball(*state, (struct metal){true, false, true, .5, 0, 0},
+               (struct metal){true, true, true, .5, 0, 0}, 3e-4);
 }
 TEST_WITH(beckmann_facets_in_white, probe_setup, probe_teardown)
 {
-    check_ball(*state, (struct metal){false, false, true, .4},
-               (struct metal){true, false, true, .4}, 3e-4);
+    check_ball(*state, (struct metal){false, false, true, .4, 0, 0},
+               (struct metal){true, false, true, .4, 0, 0}, 3e-4);
+}
+TEST_WITH(plastic_in_white, probe_setup, probe_teardown)
+{
+    check_ball(*state, (struct metal){false, true, false, .6, .4, .1},
+               (struct metal){false, false, false, .6, .3, .1}, 3e-4);
 }
 TEST_WITH(rough_beckmann_facets_in_white, probe_setup, probe_teardown)
 {
-    check_ball(*state, (struct metal){false, true, false, 1.1},
-               (struct metal){false, true, false, 1.2}, 3e-4);
+    check_ball(*state, (struct metal){false, true, false, 1.1, 0, 0},
+               (struct metal){false, true, false, 1.2, 0, 0}, 3e-4);
 }
 
 /* A plane under the eye's direction at 50 degrees, in a sky: the whole lobe, weighted. Its local frame
@@ -165,13 +188,13 @@ static void check_lobe(struct probe *f, struct metal is)
 
 TEST_WITH(closure_in_a_sky, probe_setup, probe_teardown)
 {
-    check_lobe(*state, (struct metal){true, true, false, .3});
+    check_lobe(*state, (struct metal){true, true, false, .3, 0, 0});
 }
 TEST_WITH(ggx_facets_in_a_sky, probe_setup, probe_teardown)
 {
-    check_lobe(*state, (struct metal){true, false, true, .3});
+    check_lobe(*state, (struct metal){true, false, true, .3, 0, 0});
 }
 TEST_WITH(beckmann_facets_in_a_sky, probe_setup, probe_teardown)
 {
-    check_lobe(*state, (struct metal){false, true, true, .3});
+    check_lobe(*state, (struct metal){false, true, true, .3, 0, 0});
 }

@@ -185,6 +185,25 @@ TEST_WITH(microfacets, setup, teardown)
     expect(f, 1, "tests/reference/cycles/facets.expected");
 }
 
+/* Diffuse and a sharp mirror may meet every light, facets of a highlight only what rays run into. */
+TEST_WITH(plastic, setup, teardown)
+{
+    struct fixture *f = *state;
+    struct material *m = &f->s.materials[0];
+    m->kind = MATERIAL_PLASTIC;
+    m->reflectance = (rgb){.5f, .25f, 0};
+    m->mirror = (rgb){0, .25f, .5f};
+    m->microfacet = MICROFACET_BECKMANN;
+    m->separable = true;
+    m->alpha = .25f;
+    expect_part(f, "\"specular\":[0.0,0.0,0.0],\n\"mirror\":[0.0,0.25,0.5]");
+    m->specular = (rgb){.5f, 0, 0};
+    assert_refused(f, 1, "material 'm': a point light cannot");
+    put_out_delta_lights(f);
+    expect_part(
+        f, "\"distribution\":\"beckmann\",\n\"alpha\":0.25,\n\"separable\":true,\n\"facets\":true");
+}
+
 TEST_WITH(ambient_light, setup, teardown)
 {
     struct fixture *f = *state;
