@@ -786,6 +786,7 @@ part tests/end_to_end/source.sh "$build"
 part tests/end_to_end/autograder.sh "$build"
 part tests/end_to_end/library.sh "$plain"
 part tests/end_to_end/own_suite.sh "$plain"
+part tests/end_to_end/engines.sh "$plain"
 part tests/end_to_end/packaging.sh "$plain"
 part tests/end_to_end/peers.sh
 expect "grade: without bubblewrap it refuses" 3 "unsafe-no-sandbox" env PATH=/nowhere "$assay" grade -o "$tmp/x" "$tmp/quick.rubric" "$tmp/subs/right"

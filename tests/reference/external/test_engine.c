@@ -91,8 +91,8 @@ static bool render(const struct engine *en, const struct suite_scene *s, struct 
 
 TEST(shipped_descriptions_load)
 {
-    static const char *const names[] = {"mitsuba", "pbrt", "povray_plain", "student",
-                                        "pathtracer_again", "blender"};
+    static const char *const names[] = {"mitsuba",          "pbrt",    "povray_plain", "student",
+                                        "pathtracer_again", "blender", "c-ray"};
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
         char path[128];
         struct engine en;
