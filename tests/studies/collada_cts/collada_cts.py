@@ -127,7 +127,7 @@ def main():
     print(f"- files: {len(results)}\n- loaded: {len(loaded)}, of them {sum(bool(r['notes']) for r in loaded)} with a note"
           f"\n- refused: {len(refused)}\n- crashes, hangs, or more than one line: {len(broken)}")
     table("refused because of", collections.Counter(reason(r["lines"][-1], root) for r in refused))
-    table("note", collections.Counter(reason(n, root) for r in loaded for n in r["notes"]))
+    table("note", collections.Counter(reason(part, root) for r in loaded for n in r["notes"] for part in n.split("; ")))
     table("loaded, but", collections.Counter(reason(r["unlit"], root) for r in loaded if "unlit" in r))
     for r in broken:
         print(f"\nBROKEN {r['path']}: {r['status']}: {r['lines'][:3]}")
