@@ -11,7 +11,7 @@
  *              "tan_h": half width of the image plane at distance 1,
  *              "clip": [near, far],     planar distances that cut nothing of the scene
  *              "lens_radius" (0: pinhole), "focal_distance"}
- *   "materials": [{"name", "kind": "diffuse", "mirror", "refraction", "glass" or "microfacet",
+ *   "materials": [{"name", "kind": "diffuse", "mirror", "refraction", "glass", "microfacet" or "plastic",
  *                  "reflectance": [r,g,b] (of both sides), "radiance": [r,g,b],
  *                  "both_sides": emits from the back too,
  *                  "reflectance_map", "radiance_map" (each only if there is one): {"file": an EXR of linear texels beside the dump,
@@ -21,7 +21,8 @@
  *                                        "schlick",
  *                  microfacet: "distribution": "ggx" or "beckmann", "alpha", "separable",
  *                              "eta", "k": [r,g,b] or null (then reflectance at any angle),
- *                              "facets": true: by random facets; false: Blender's own closure does}]
+ *                              "facets": true: by random facets; false: Blender's own closure does,
+ *                  plastic: the same of its highlight, "specular", "mirror": [r,g,b]}]
  *   "meshes": [{"name", "material": index, "positions": [9 numbers a triangle],
  *               "normals": [9 numbers a triangle], on the geometric normal's side, or null: flat,
  *               "uv": [6 numbers a triangle], only if the material has a map}]
@@ -42,8 +43,8 @@
 /* Writes the dump, an environment's image to <path>.exr and texture N's to <path>.textureN.exr, each by rename. Fails on a write error,
  * and with a line that starts with "Cycles: " on what our recipe for Cycles cannot express: pixels
  * that are not square, an angle of view out of Blender's range, clipping planes that cut geometry, a
- * depth above 1025, shading normals of one triangle on both of its sides, a microfacet that takes
- * facets (all but GGX, separable, of constant reflectance, alpha 0.01 to 1) where there are lights that
+ * depth above 1025, shading normals of one triangle on both of its sides, a microfacet or a
+ * highlight that takes facets (all but GGX, separable, of constant reflectance, alpha 0.01 to 1) where there are lights that
  * no ray runs into: point, spot, directional, the assignment's ambient light. */
 bool export_cycles(const struct scene *s, const struct camera *c, int depth, const char *path,
                    struct err *e) __attribute__((warn_unused_result));

@@ -44,6 +44,7 @@ static const char *const fixed_names[NUM_FIXED] = {
     [FEATURE_SCHLICK] = "glass by Schlick's approximation",
     [FEATURE_MICROFACET] = "rough metal (GGX)",
     [FEATURE_BECKMANN] = "rough metal (Beckmann)",
+    [FEATURE_PLASTIC] = "highlights on matt surfaces",
     [FEATURE_AREA] = "glowing surfaces",
     [FEATURE_TWO_SIDED] = "surfaces that glow on both sides",
     [FEATURE_POINT] = "a point light",

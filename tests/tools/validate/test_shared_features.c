@@ -62,9 +62,14 @@ static bool has_lens(const struct suite_scene *s)
     return s->lens_radius > 0;
 }
 
+static bool has_mirror(const struct suite_scene *s)
+{
+    return file_has(s->dae, "<mirror>") || file_has(s->dae, "<reflective>");
+}
+
 static bool is_specular(const struct suite_scene *s)
 {
-    return file_has(s->dae, "<mirror>") || has_glass(s) || file_has(s->dae, "<refraction>");
+    return has_mirror(s) || has_glass(s) || file_has(s->dae, "<refraction>");
 }
 
 static bool is_of_odd_size(const struct suite_scene *s)
@@ -80,7 +85,7 @@ static bool has_sky_image(const struct suite_scene *s)
 /* Neither does it alone. */
 static bool has_mirror_and_spheres(const struct suite_scene *s)
 {
-    return file_has(s->dae, "<mirror>") && file_has(s->dae, "<sphere>");
+    return has_mirror(s) && file_has(s->dae, "<sphere>");
 }
 
 static bool every_third(const struct suite_scene *s)
