@@ -25,8 +25,6 @@ struct place {
     int depth;
 };
 
-static const double DEGREE = 3.14159265358979323846 / 180;
-
 /* To Y_UP, by the table of the specification. */
 static const char AXIS_NAMES[] = "Y_UP X_UP Z_UP";
 static const double AXES[][3][3] = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
@@ -36,7 +34,7 @@ static const double AXES[][3][3] = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
 /* The element's own <asset>, on top of what is in *f. */
 static void read_asset(struct loader *ld, const xmlNode *element, struct frame *f)
 {
-    const xmlNode *asset = element_first_child(element); /* there, as the survey has seen */
+    const xmlNode *asset = element_first(element); /* there, as the survey has seen */
     if (!element_is(asset, "asset"))
         return;
     const xmlNode *unit = element_child(asset, "unit"), *up = element_child(asset, "up_axis");
@@ -141,10 +139,9 @@ static mat4 read_transform(struct loader *ld, const xmlNode *n)
     int kind =
         element_place_among((const char *)n->name, "lookat matrix rotate scale skew translate");
     double v[16];
-    if (kind == MATRIX && ld->dialect == DIALECT_CGL)
-        text_read_up_to(ld, n, v, 16);
-    else if (kind >= 0)
-        text_read_exactly(ld, n, v, COUNT[kind]);
+    if (kind >= 0)
+        text_read_numbers(ld, n, v, kind == MATRIX && ld->dialect == DIALECT_CGL ? 1 : COUNT[kind],
+                          COUNT[kind]);
     switch (ld->failed ? -1 : kind) {
     case LOOKAT: return make_lookat(ld, n, v);
     case MATRIX: return make_matrix(ld, n, v);
@@ -220,7 +217,7 @@ static void instance_node(struct loader *ld, const xmlNode *instance, const stru
 }
 
 /* <instance_light> or <instance_camera>. */
-static void instance_eye_or_lamp(struct loader *ld, const xmlNode *c, const struct place *at)
+static void instance_light_or_camera(struct loader *ld, const xmlNode *c, const struct place *at)
 {
     bool is_light = element_is(c, "instance_light");
     struct frame inside;
@@ -252,12 +249,11 @@ static void walk(struct loader *ld, const xmlNode *node, const struct place *abo
                   "instance_geometry* instance_light* instance_node* node* extra*");
     mat4 m = enter(ld, node, &above->frame, &at.frame);
     at.to_world = mat4_mul(&above->to_world, &m);
-    for (const xmlNode *c = element_first_child(node); c != NULL; c = element_next_sibling(c)) {
+    for (const xmlNode *c = element_first(node); c != NULL; c = element_next(c)) {
         m = read_transform(ld, c);
         at.to_world = mat4_mul(&at.to_world, &m);
     }
-    for (const xmlNode *c = element_first_child(node); c != NULL && !ld->failed;
-         c = element_next_sibling(c)) {
+    for (const xmlNode *c = element_first(node); c != NULL && !ld->failed; c = element_next(c)) {
         if (element_is(c, "node"))
             walk(ld, c, &at);
         else if (element_is(c, "instance_node"))
@@ -265,7 +261,7 @@ static void walk(struct loader *ld, const xmlNode *node, const struct place *abo
         else if (element_is(c, "instance_geometry"))
             instance_geometry(ld, c, &at);
         else if (element_is_one_of(c, "instance_light instance_camera"))
-            instance_eye_or_lamp(ld, c, &at);
+            instance_light_or_camera(ld, c, &at);
     }
 }
 
@@ -289,14 +285,13 @@ static void write_notes(struct loader *ld)
         "%u lights of Blender have no radius here: set theirs to 0, or give an area light",
         "%u spots of Blender have a sharp edge here: set their blend to 0",
         "%u upright cameras of Blender: right if its sensor fit is horizontal"};
+    char text[160];
     for (int i = 0; i < NUM_LEFT_OUT; i++) {
-        char text[128];
         snprintf(text, sizeof text, LEFT_OUT[i], ld->num_left_out[i]);
         if (ld->num_left_out[i] > 0)
             add_note(ld, text);
     }
     if (ld->scene.num_cameras > 1 && ld->dialect == DIALECT_COLLADA) {
-        char text[160];
         snprintf(text, sizeof text, "the first of %u cameras, '%s' (--list-cameras, --camera NAME)",
                  ld->scene.num_cameras, ld->scene.camera.name);
         add_note(ld, text);
@@ -312,22 +307,22 @@ static void write_notes(struct loader *ld)
  * as exporters leave them. */
 static void check_libraries(struct loader *ld, const xmlNode *root)
 {
-    for (const xmlNode *c = element_first_child(root); c != NULL; c = element_next_sibling(c)) {
-        bool moves = element_is_one_of(
-            c, "library_animations library_animation_clips library_controllers library_formulas "
-               "library_force_fields library_physics_materials library_physics_models "
-               "library_physics_scenes library_joints library_kinematics_models "
-               "library_kinematics_scenes library_articulated_systems");
-        if (element_is_one_of(c,
-                              "asset scene extra library_cameras library_lights library_images "
-                              "library_effects library_materials library_geometries library_nodes "
-                              "library_visual_scenes"))
+    static const char SHOWN[] = "asset scene extra library_cameras library_lights library_images "
+                                "library_effects library_materials library_geometries "
+                                "library_nodes library_visual_scenes";
+    static const char MOVING[] =
+        "library_animations library_animation_clips library_controllers library_formulas "
+        "library_force_fields library_physics_materials library_physics_models "
+        "library_physics_scenes library_joints library_kinematics_models "
+        "library_kinematics_scenes library_articulated_systems";
+    for (const xmlNode *c = element_first(root); c != NULL; c = element_next(c)) {
+        if (element_is_one_of(c, SHOWN))
             continue;
         if (strncmp((const char *)c->name, "library_", 8) != 0)
             element_fail_unexpected(ld, c);
-        if (!moves)
+        if (!element_is_one_of(c, MOVING))
             element_check(ld, c, "asset? extra*");
-        for (const xmlNode *i = element_first_child(c); i != NULL; i = element_next_sibling(i))
+        for (const xmlNode *i = element_first(c); i != NULL; i = element_next(i))
             ld->num_left_out[LEFT_OUT_MOVING] += !element_is_one_of(i, "asset extra");
     }
 }
@@ -336,9 +331,9 @@ static void check_libraries(struct loader *ld, const xmlNode *root)
 static const xmlNode *find_only_visual_scene(struct loader *ld, const xmlNode *root)
 {
     const xmlNode *only = NULL;
-    for (const xmlNode *c = element_first_child(root); c != NULL; c = element_next_sibling(c)) {
-        const xmlNode *v = element_is(c, "library_visual_scenes") ? element_first_child(c) : NULL;
-        for (; v != NULL; v = element_next_sibling(v)) {
+    for (const xmlNode *c = element_first(root); c != NULL; c = element_next(c)) {
+        const xmlNode *v = element_is(c, "library_visual_scenes") ? element_first(c) : NULL;
+        for (; v != NULL; v = element_next(v)) {
             if (!element_is(v, "visual_scene"))
                 continue;
             if (only != NULL)
@@ -377,8 +372,7 @@ static bool read_scene(struct loader *ld, const xmlNode *root)
             top.to_world.m[0][j] = -top.to_world.m[0][j];
             top.to_world.m[2][j] = -top.to_world.m[2][j];
         }
-    for (const xmlNode *c = element_first_child(visual); c != NULL && !ld->failed;
-         c = element_next_sibling(c))
+    for (const xmlNode *c = element_first(visual); c != NULL && !ld->failed; c = element_next(c))
         if (element_is(c, "node"))
             walk(ld, c, &top);
     light_finish(ld);
@@ -408,26 +402,14 @@ static bool read_scene(struct loader *ld, const xmlNode *root)
     return true;
 }
 
-/* Gives the scene the paths of all documents but its own. */
-static bool name_documents(struct loader *ld)
-{
-    struct scene *s = &ld->scene;
-    s->documents = malloc(ld->num_documents * sizeof *s->documents);
-    if (s->documents == NULL)
-        return fail_memory(ld);
-    for (size_t i = 1; i < ld->num_documents; i++) {
-        s->documents[s->num_documents++] = ld->documents[i]->path;
-        ld->documents[i]->path = NULL;
-    }
-    return true;
-}
-
-static bool load(struct text_input *in, const char *path, enum dialect dialect, struct scene *out,
-                 struct err *e)
+/* Takes the file, which is of that path or of a text in memory. */
+static bool load(FILE *file, bool is_file, const char *path, enum dialect dialect,
+                 struct scene *out, struct err *e)
 {
     struct loader ld = {.path = path, .err = e, .dialect = dialect};
-    const struct document *d = xml_open(&ld, path, in);
-    bool ok = d != NULL && read_scene(&ld, xmlDocGetRootElement(d->doc)) && name_documents(&ld);
+    const struct document *d = xml_open(&ld, path, file, is_file);
+    bool ok = d != NULL && read_scene(&ld, xmlDocGetRootElement(d->doc));
+    fclose(file);
     if (ok)
         *out = ld.scene;
     else
@@ -437,7 +419,6 @@ static bool load(struct text_input *in, const char *path, enum dialect dialect, 
     for (size_t i = 0; i < ld.num_documents; i++) {
         xmlFreeDoc(ld.documents[i]->doc);
         xmlHashFree(ld.documents[i]->ids, NULL);
-        free(ld.documents[i]->path);
         free(ld.documents[i]);
     }
     free(ld.documents);
@@ -450,8 +431,9 @@ static bool load(struct text_input *in, const char *path, enum dialect dialect, 
 bool collada_parse(const char *text, size_t size, const char *path, enum dialect dialect,
                    struct scene *out, struct err *e)
 {
-    struct text_input in = {.text = text, .size = size};
-    return load(&in, path, dialect, out, e);
+    FILE *file = fmemopen((char *)text, size, "r");
+    return file != NULL ? load(file, false, path, dialect, out, e)
+                        : err_set(e, "%s: out of memory", path);
 }
 
 /* What people try first, by its ending. */
@@ -469,14 +451,11 @@ static bool is_other_format(const char *path)
 
 bool collada_load(const char *path, enum dialect dialect, struct scene *out, struct err *e)
 {
-    struct text_input in = {.file = fs_open(path)};
-    if (in.file == NULL)
+    FILE *file = fs_open(path);
+    if (file == NULL)
         return err_set(e, "%s: cannot read: %s", path, strerror(errno));
-    if (is_other_format(path)) {
-        fclose(in.file);
-        return err_set(e, "%s: only COLLADA (.dae) is read", path);
-    }
-    bool ok = load(&in, path, dialect, out, e);
-    fclose(in.file);
-    return ok;
+    if (!is_other_format(path))
+        return load(file, true, path, dialect, out, e);
+    fclose(file);
+    return err_set(e, "%s: only COLLADA (.dae) is read", path);
 }

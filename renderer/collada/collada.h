@@ -12,8 +12,8 @@
 bool collada_load(const char *path, enum dialect dialect, struct scene *out, struct err *e)
     __attribute__((warn_unused_result));
 
-/* The same for a document of `size` bytes in memory, which may not refer to other files; path is only its name in error
- * lines and where its images are beside. */
+/* The same for a document of `size` bytes in memory, the first zero being its end, which may not refer to other files;
+ * path is only its name in error lines and where its images are beside. */
 bool collada_parse(const char *text, size_t size, const char *path, enum dialect dialect,
                    struct scene *out, struct err *e) __attribute__((warn_unused_result));
 

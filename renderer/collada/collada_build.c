@@ -7,10 +7,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Room for 8, then for the next power of two. */
-void *build_grow(struct loader *ld, void *data, size_t size, size_t count)
+void *build_grow_now(struct loader *ld, void *data, size_t size, size_t count)
 {
-    if (ld->failed || (count != 0 && (count < 8 || (count & (count - 1)) != 0)))
+    if (ld->failed)
         return data;
     size_t more = count < 8 ? 8 : 2 * count;
     void *p = more <= SIZE_MAX / size ? realloc(data, more * size) : NULL;
@@ -83,10 +82,10 @@ vec3 build_place(struct loader *ld, const xmlNode *n, const char *what, const ma
     return build_to_float(w);
 }
 
-vec3 build_direction(struct loader *ld, const xmlNode *n, const char *what, dvec3 v)
+vec3 build_direction(struct loader *ld, const xmlNode *n, dvec3 v)
 {
     if (!d3_normalize(&v))
-        fail_at(ld, n, "%s has no direction", what);
+        fail_at(ld, n, "this has no direction");
     return build_to_float(v);
 }
 
@@ -120,8 +119,8 @@ void build_add_triangle(struct loader *ld, const xmlNode *n, const mat4 *m, doub
     ng = normalize(ng);
     vec3 sum = v3(0, 0, 0);
     for (int k = 0; k < 3; k++) {
-        const float *f = in[k]->normal;
-        dvec3 w = d3_scale(mat4_cofactor(m, d3(f[0], f[1], f[2])), sign);
+        vec3 f = in[k]->normal;
+        dvec3 w = d3_scale(mat4_cofactor(m, d3(f.x, f.y, f.z)), sign);
         normal[k] = d3_normalize(&w) ? build_to_float(w) : ng;
         sum = add(sum, normal[k]);
     }

@@ -1,20 +1,13 @@
 /* <camera> as it is instanced. */
 #include "collada_internal.h"
 
-static const double DEGREE = 3.14159265358979323846 / 180;
-
 /* In metres. */
-static double read_length(struct loader *ld, const xmlNode *n, const char *name)
+static float read_length(struct loader *ld, const xmlNode *n, const char *name)
 {
     double v = ld->unit * field_number(ld, n, name, 0, ANY_LENGTH);
     if (v > FARTHEST)
         fail_at(ld, n, "<%s> is out of range", name);
-    return v;
-}
-
-static float read_angle(struct loader *ld, const xmlNode *n, const char *name)
-{
-    return (float)(field_number(ld, n, name, 0, 1e-6, 179.9999) * DEGREE);
+    return (float)v;
 }
 
 /* <perspective> or <orthographic>. */
@@ -24,25 +17,22 @@ static void read_kind(struct loader *ld, const xmlNode *n, struct scene_camera *
     element_check(ld, n,
                   is_flat ? "xmag? ymag? aspect_ratio? znear zfar"
                           : "xfov? yfov? aspect_ratio? znear zfar");
-    double near = read_length(ld, n, "znear"), far = read_length(ld, n, "zfar"),
-           x = read_length(ld, n, "xmag"), y = read_length(ld, n, "ymag"),
-           aspect = field_number(ld, n, "aspect_ratio", 0, 1e-6, 1e6);
-    c->near = (float)near;
-    c->far = (float)far;
-    c->xmag = (float)x;
-    c->ymag = (float)y;
-    c->aspect = (float)aspect;
-    c->hfov = read_angle(ld, n, "xfov");
-    c->vfov = read_angle(ld, n, "yfov");
-    if (!(far > near))
+    c->near = read_length(ld, n, "znear");
+    c->far = read_length(ld, n, "zfar");
+    c->xmag = read_length(ld, n, "xmag");
+    c->ymag = read_length(ld, n, "ymag");
+    c->hfov = (float)(field_number(ld, n, "xfov", 0, 1e-6, 179.9999) * DEGREE);
+    c->vfov = (float)(field_number(ld, n, "yfov", 0, 1e-6, 179.9999) * DEGREE);
+    c->aspect = (float)field_number(ld, n, "aspect_ratio", 0, 1e-6, 1e6);
+    if (!(c->far > c->near))
         fail_at(ld, n, "<zfar> is not beyond <znear>");
-    if (is_flat && x == 0 && y == 0)
+    if (is_flat && c->xmag == 0 && c->ymag == 0)
         fail_at(ld, n, "<orthographic> needs <xmag> or <ymag>");
     if (is_flat)
         return;
     /* Blender writes the angle of the larger side for <xfov>, unless told which is meant. */
     ld->num_left_out[LEFT_OUT_UPRIGHT] +=
-        ld->blender_version > 0 && ld->dialect == DIALECT_COLLADA && aspect > 0 && aspect < 1;
+        ld->blender_version > 0 && ld->dialect == DIALECT_COLLADA && c->aspect > 0 && c->aspect < 1;
     if (ld->dialect == DIALECT_CGL) {
         if (c->hfov == 0)
             c->hfov = (float)(50 * DEGREE);
@@ -76,14 +66,12 @@ static void place(struct loader *ld, const xmlNode *n, const mat4 *m, struct sce
         look_cgl(out, c);
         return;
     }
-    double sign = build_transform_sign(ld, n, m);
     dvec3 x = mat4_column(m, 0), y = mat4_column(m, 1), z = mat4_column(m, 2);
-    if (!d3_normalize(&x) || !d3_normalize(&y) || !d3_normalize(&z))
-        fail_at(ld, n, "the transforms above are singular");
-    if (fabs(d3_dot(x, y)) > 1e-4 || fabs(d3_dot(y, z)) > 1e-4 || fabs(d3_dot(z, x)) > 1e-4)
-        fail_at(ld, n, "the transforms above shear the camera");
-    if (sign < 0)
+    if (build_transform_sign(ld, n, m) < 0)
         fail_at(ld, n, "the transforms above mirror the camera: not supported");
+    if (!d3_normalize(&x) || !d3_normalize(&y) || !d3_normalize(&z) || fabs(d3_dot(x, y)) > 1e-4 ||
+        fabs(d3_dot(y, z)) > 1e-4 || fabs(d3_dot(z, x)) > 1e-4)
+        fail_at(ld, n, "the transforms above shear the camera");
     out->right = build_to_float(x);
     out->up = build_to_float(y);
     out->backward = build_to_float(z);
@@ -101,7 +89,7 @@ void camera_instance(struct loader *ld, const xmlNode *instance, const xmlNode *
     const xmlNode *common = element_child(optics, "technique_common");
     element_check(ld, common,
                   ld->dialect == DIALECT_CGL ? "perspective" : "perspective|orthographic");
-    read_kind(ld, element_first_child(common), &c);
+    read_kind(ld, element_first(common), &c);
     place(ld, instance, m, &c);
     build_copy_name(c.name, sizeof c.name, node_name);
     s->cameras = build_grow(ld, s->cameras, sizeof *s->cameras, s->num_cameras);

@@ -3,41 +3,25 @@
 
 #include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
-static void fail(struct loader *ld, const xmlNode *n, long line, const char *fmt, va_list ap)
+bool fail_line(struct loader *ld, const xmlNode *n, long line, const char *fmt, ...)
 {
     char text[900];
+    va_list ap;
     if (ld->failed)
-        return;
+        return false;
     ld->failed = true;
+    va_start(ap, fmt);
     vsnprintf(text, sizeof text, fmt, ap);
+    va_end(ap);
     const char *path = n != NULL ? element_document(n)->path : ld->path;
-    if (line > 0)
-        err_set(ld->err, "%s:%ld: %s", path, line, text);
-    else
-        err_set(ld->err, "%s: %s", path, text);
+    return line > 0 ? err_set(ld->err, "%s:%ld: %s", path, line, text)
+                    : err_set(ld->err, "%s: %s", path, text);
 }
 
-bool(fail_line)(struct loader *ld, const xmlNode *n, long line, const char *fmt, ...)
-{
-    va_list ap;
-    va_start(ap, fmt);
-    fail(ld, n, line, fmt, ap);
-    va_end(ap);
-    return false;
-}
-
-bool(fail_at)(struct loader *ld, const xmlNode *n, const char *fmt, ...)
-{
-    va_list ap;
-    va_start(ap, fmt);
-    fail(ld, n, element_line(n), fmt, ap);
-    va_end(ap);
-    return false;
-}
-
-bool(fail_memory)(struct loader *ld)
+bool fail_memory(struct loader *ld)
 {
     return fail_line(ld, NULL, 0, "out of memory");
 }
@@ -74,12 +58,12 @@ static bool has_our_namespace(const xmlNode *n)
     return a == b || (a != NULL && b != NULL && xmlStrEqual(a->href, b->href));
 }
 
-const xmlNode *element_first_child(const xmlNode *n)
+const xmlNode *element_first(const xmlNode *n)
 {
     return xmlFirstElementChild((xmlNode *)n);
 }
 
-const xmlNode *element_next_sibling(const xmlNode *n)
+const xmlNode *element_next(const xmlNode *n)
 {
     return xmlNextElementSibling((xmlNode *)n);
 }
@@ -142,14 +126,14 @@ bool element_is_one_of(const xmlNode *n, const char *words)
 bool element_check(struct loader *ld, const xmlNode *n, const char *words)
 {
     struct word w;
-    for (const xmlNode *c = element_first_child(n); c != NULL; c = element_next_sibling(c))
+    for (const xmlNode *c = element_first(n); c != NULL; c = element_next(c))
         if (!element_is_one_of(c, words))
             return element_fail_unexpected(ld, c);
     while (n != NULL && next_word(&words, &w)) {
         const xmlNode *one = NULL;
         if (w.how_many == '*')
             continue;
-        for (const xmlNode *c = element_first_child(n); c != NULL; c = element_next_sibling(c)) {
+        for (const xmlNode *c = element_first(n); c != NULL; c = element_next(c)) {
             if (!word_has(&w, (const char *)c->name) || !has_our_namespace(c))
                 continue;
             if (one != NULL)
@@ -168,10 +152,20 @@ bool element_check(struct loader *ld, const xmlNode *n, const char *words)
 
 const xmlNode *element_child(const xmlNode *n, const char *name)
 {
-    const xmlNode *c = element_first_child(n);
+    const xmlNode *c = element_first(n);
     while (c != NULL && !element_is(c, name))
-        c = element_next_sibling(c);
+        c = element_next(c);
     return c;
+}
+
+const xmlNode *element_child_with(const xmlNode *n, const char *name, const char *attribute,
+                                  const char *value)
+{
+    for (const xmlNode *c = element_first(n); c != NULL; c = element_next(c))
+        if (value != NULL && element_is(c, name) &&
+            xmlStrEqual(BAD_CAST element_attribute(c, attribute), BAD_CAST value))
+            return c;
+    return NULL;
 }
 
 const char *element_attribute(const xmlNode *n, const char *name)
@@ -197,14 +191,11 @@ uint64_t element_count_or(struct loader *ld, const xmlNode *n, const char *name,
     const char *s = element_attribute(n, name);
     if (s == NULL)
         return missing;
-    s += strspn(s, " ");
-    uint64_t v = 0;
-    size_t digits = strspn(s, "0123456789");
-    for (size_t i = 0; i < digits && v < UINT32_MAX; i++)
-        v = 10 * v + (uint64_t)(s[i] - '0');
-    if (digits == 0 || s[digits + strspn(s + digits, " ")] != '\0' || v >= UINT32_MAX)
+    char *end;
+    uint64_t v = strtoull(s, &end, 10);
+    if (end == s || end[strspn(end, " ")] != '\0' || strchr(s, '-') != NULL || v >= UINT32_MAX)
         fail_at(ld, n, "<%.60s>: attribute %s=\"%.60s\" is not a number below 2^32-1",
-                (const char *)n->name, name, element_attribute(n, name));
+                (const char *)n->name, name, s);
     return v;
 }
 
@@ -222,10 +213,9 @@ bool element_is_own_profile(const char *profile)
 const xmlNode *element_own_technique(struct loader *ld, const xmlNode *n)
 {
     const xmlNode *own = NULL;
-    for (const xmlNode *extra = element_first_child(n); extra != NULL;
-         extra = element_next_sibling(extra)) {
-        const xmlNode *t = element_is(extra, "extra") ? element_first_child(extra) : NULL;
-        for (; t != NULL; t = element_next_sibling(t)) {
+    for (const xmlNode *extra = element_first(n); extra != NULL; extra = element_next(extra)) {
+        const xmlNode *t = element_is(extra, "extra") ? element_first(extra) : NULL;
+        for (; t != NULL; t = element_next(t)) {
             if (!element_is(t, "technique") ||
                 !element_is_own_profile(element_attribute(t, "profile")))
                 continue;

@@ -15,9 +15,8 @@ static void read_emission(struct loader *ld, const xmlNode *tag, bool is_cgl, st
     m->radiance_both_sides = is_cgl || field_choice(ld, tag, "sides", "1 2", 0) == 1;
 }
 
-static void read_mirror(struct loader *ld, const xmlNode *tag, bool is_cgl, struct material *m)
+static void read_mirror(struct loader *ld, const xmlNode *tag, struct material *m)
 {
-    (void)is_cgl;
     element_check(ld, tag, "reflectance");
     m->kind = MATERIAL_MIRROR;
     m->reflectance = field_color(ld, tag, "reflectance", 1);
@@ -25,10 +24,9 @@ static void read_mirror(struct loader *ld, const xmlNode *tag, bool is_cgl, stru
 
 /* <glass> or <refraction>, smooth only. The assignment's files carry a <roughness> that nothing uses; another than 0
  * would mean something. */
-static void read_dielectric(struct loader *ld, const xmlNode *tag, bool is_cgl, struct material *m)
+static void read_dielectric(struct loader *ld, const xmlNode *tag, struct material *m)
 {
     bool is_glass = element_is(tag, "glass");
-    (void)is_cgl;
     element_check(ld, tag,
                   is_glass ? "transmittance reflectance ior roughness?"
                            : "transmittance ior roughness?");
@@ -58,19 +56,10 @@ static void read_microfacet(struct loader *ld, const xmlNode *tag, bool is_cgl, 
     m->reflectance = field_color(ld, tag, "reflectance", 1);
 }
 
-/* To support one more tag, give it a reader here. */
-static const struct material_tag {
-    const char *name;
-    void (*read)(struct loader *ld, const xmlNode *tag, bool is_cgl, struct material *m);
-} TAGS[] = {
-    {"emission", read_emission},     {"mirror", read_mirror},         {"glass", read_dielectric},
-    {"refraction", read_dielectric}, {"microfacet", read_microfacet},
-};
-
 void extra_read_material(struct loader *ld, const xmlNode *technique, struct material *m)
 {
     bool is_cgl = strcmp(element_attribute(technique, "profile"), "CGL") == 0;
-    const xmlNode *tag = element_first_child(technique);
+    const xmlNode *tag = element_first(technique);
     if (!element_check(ld, technique, "emission|mirror|glass|refraction|microfacet"))
         return;
     if (is_cgl || !element_is(tag, "emission")) { /* which takes the place of what reflects */
@@ -79,7 +68,12 @@ void extra_read_material(struct loader *ld, const xmlNode *technique, struct mat
         m->reflectance_map = 0;
         m->separable = false;
     }
-    for (size_t i = 0; i < sizeof TAGS / sizeof *TAGS; i++)
-        if (element_is(tag, TAGS[i].name))
-            TAGS[i].read(ld, tag, is_cgl, m);
+    if (element_is(tag, "emission"))
+        read_emission(ld, tag, is_cgl, m);
+    else if (element_is(tag, "mirror"))
+        read_mirror(ld, tag, m);
+    else if (element_is(tag, "microfacet"))
+        read_microfacet(ld, tag, is_cgl, m);
+    else
+        read_dielectric(ld, tag, m);
 }

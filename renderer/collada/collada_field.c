@@ -6,7 +6,9 @@ double field_number(struct loader *ld, const xmlNode *n, const char *name, doubl
 {
     const xmlNode *c = element_child(n, name);
     double v = missing;
-    if (c != NULL && text_read_exactly(ld, c, &v, 1) && !(v >= lo && v <= hi))
+    if (c != NULL)
+        text_read_numbers(ld, c, &v, 1, 1);
+    if (c != NULL && !(v >= lo && v <= hi))
         fail_at(ld, c, "<%s> is %g, outside %g to %g", name, v, lo, hi);
     return v;
 }
@@ -14,8 +16,8 @@ double field_number(struct loader *ld, const xmlNode *n, const char *name, doubl
 rgb field_color(struct loader *ld, const xmlNode *n, const char *name, float most)
 {
     const xmlNode *c = element_child(n, name);
-    rgb v = grey(0);
-    if (c != NULL && text_read_color(ld, c, &v, NULL) && rgb_max(v) > most)
+    rgb v = c != NULL ? text_read_color(ld, c, NULL) : grey(0);
+    if (rgb_max(v) > most)
         fail_at(ld, c, "<%s> above %g", name, (double)most);
     return v;
 }

@@ -3,8 +3,8 @@
  * lights (collada_light.c), cameras (collada_camera.c), and the growing scene (collada_build.c).
  *
  * The first failure puts "path:line: what" into loader.err and sets loader.failed; later ones change nothing. Readers go
- * on with zeros, black and NULL, which every function here takes, and look at `failed` where they would loop, grow an
- * array or look behind a pointer. Those of type bool return !failed. */
+ * on with zeros, black and NULL, which the functions of collada_element.c take for an element, and look at `failed` before
+ * they loop for long, write to an array or follow a pointer. Those of type bool return !failed. */
 #ifndef ASSAY_COLLADA_INTERNAL_H
 #define ASSAY_COLLADA_INTERNAL_H
 
@@ -15,6 +15,9 @@
 #include <libxml/hash.h>
 #include <libxml/tree.h>
 #include <stdio.h>
+
+#define PI     3.14159265358979323846
+#define DEGREE (PI / 180)
 
 /* Limits that only a broken or hostile file reaches. */
 enum {
@@ -41,7 +44,7 @@ struct uints {
  */
 struct corner {
     dvec3 position;
-    float normal[3];
+    vec3 normal;
     uint32_t uv; /* where the group's sets of texture coordinates begin in the mesh */
 };
 
@@ -91,14 +94,15 @@ enum left_out {
 
 /* A file that is read: the scene's own first, then those that it refers to. */
 struct document {
-    char *path;
+    const char *path;
     bool is_file;      /* so that others can be beside it */
     xmlDoc *doc;       /* whose _private is this */
     xmlHashTable *ids; /* to the element; to this document where more than one has the id */
 };
 
 struct loader {
-    const char *path; /* of the scene */
+    const char *path; /* of the scene; of the document that is parsed */
+    FILE *file;       /* that is parsed */
     struct err *err;
     bool failed;
     enum dialect dialect;
@@ -125,41 +129,31 @@ struct loader {
 
 /* collada_xml.c */
 
-/* Where the text comes from: a file or memory, whatever is left to read. */
-struct text_input {
-    FILE *file; /* NULL: memory */
-    const char *text;
-    size_t size, taken;
-    struct loader *ld; /* while it is read */
-};
 /* Parses the text into a new document, refuses document types, foreign structure and other versions,
- * indexes the ids and resolves DIALECT_AUTO. NULL: failed. */
-const struct document *xml_open(struct loader *ld, const char *path, struct text_input *in);
+ * indexes the ids and resolves DIALECT_AUTO. The path must live as long as the loader. NULL: failed. */
+const struct document *xml_open(struct loader *ld, const char *path, FILE *file, bool is_file);
 
 /* collada_element.c */
 
 /* Sets the line "path:line: ...", unless one is set. Always false. */
-bool fail_at(struct loader *ld, const xmlNode *n, const char *fmt, ...)
-    __attribute__((format(printf, 3, 4)));
+#define fail_at(ld, n, ...) fail_line(ld, n, element_line(n), __VA_ARGS__)
 /* n: of the document that is meant; NULL: ld->path. line 0: of no line. */
 bool fail_line(struct loader *ld, const xmlNode *n, long line, const char *fmt, ...)
     __attribute__((format(printf, 4, 5)));
 bool fail_memory(struct loader *ld);
-#ifdef __clang_analyzer__ /* as in err.h */
-#define fail_at(...)    ((void)fail_at(__VA_ARGS__), false)
-#define fail_line(...)  ((void)fail_line(__VA_ARGS__), false)
-#define fail_memory(ld) ((void)fail_memory(ld), false)
-#endif
 /* "unexpected <child> in <parent>". */
 bool element_fail_unexpected(struct loader *ld, const xmlNode *child);
 long element_line(const xmlNode *n);
 const struct document *element_document(const xmlNode *n);
 
 /* Child elements in document order; NULL at the end. */
-const xmlNode *element_first_child(const xmlNode *n);
-const xmlNode *element_next_sibling(const xmlNode *n);
+const xmlNode *element_first(const xmlNode *n);
+const xmlNode *element_next(const xmlNode *n);
 /* First child element of that name or NULL. */
 const xmlNode *element_child(const xmlNode *n, const char *name);
+/* The first whose attribute has that value; NULL: none. */
+const xmlNode *element_child_with(const xmlNode *n, const char *name, const char *attribute,
+                                  const char *value);
 /* Is it the COLLADA element of that name? */
 bool element_is(const xmlNode *n, const char *name);
 /* Which of the words, separated by blanks, it is; -1: none. */
@@ -186,18 +180,13 @@ const xmlNode *element_own_technique(struct loader *ld, const xmlNode *n);
 /* The element's text as finite numbers, appended. */
 bool text_read_doubles(struct loader *ld, const xmlNode *n, struct doubles *out);
 bool text_read_uints(struct loader *ld, const xmlNode *n, struct uints *out);
-/* Exactly n of them. */
-bool text_read_exactly(struct loader *ld, const xmlNode *n, double *out, size_t count);
-/* At least one, at most `most`; the missing ones are 0. */
-bool text_read_up_to(struct loader *ld, const xmlNode *n, double *out, size_t most);
-/* A non-negative colour; alpha (may be NULL) is 1 where there are only three numbers. */
-bool text_read_color(struct loader *ld, const xmlNode *n, rgb *out, double *alpha);
+/* Between least and most numbers, and how many there were; the missing ones, and all after a failure, are 0. */
+size_t text_read_numbers(struct loader *ld, const xmlNode *n, double *out, size_t least,
+                         size_t most);
+/* A non-negative colour, black after a failure; alpha (may be NULL) is 1 where there are only three numbers. */
+rgb text_read_color(struct loader *ld, const xmlNode *n, double *alpha);
 /* The element's text without blanks around it; lives in the document. */
 const char *text_read_word(struct loader *ld, const xmlNode *n);
-
-/* Writes every %xx of a URI out, in place. What is no escape stays: many programs write names as they
- * are. */
-void text_decode_percents(char *s);
 
 /* collada_field.c: what the only child of n of that name says. */
 
@@ -254,9 +243,15 @@ void extra_read_material(struct loader *ld, const xmlNode *technique, struct mat
 
 /* collada_build.c */
 
+void *build_grow_now(struct loader *ld, void *data, size_t size, size_t count);
 /* `data`, which has `count` elements of that size and grew by this function only, with room for one more: moved or as it
- * was; always the latter after failure. Look at ld->failed before you write. */
-void *build_grow(struct loader *ld, void *data, size_t size, size_t count);
+ * was; always the latter after failure. Look at ld->failed before you write. There is room for 8, then for the next power
+ * of two. */
+static inline void *build_grow(struct loader *ld, void *data, size_t size, size_t count)
+{
+    bool has_room = count < 8 ? count != 0 : (count & (count - 1)) != 0;
+    return has_room ? data : build_grow_now(ld, data, size, count);
+}
 /* Copies a name: at most size-1 bytes, whole UTF-8 characters, no control characters. */
 void build_copy_name(char *out, size_t size, const char *name);
 /* Its index. */
@@ -265,8 +260,8 @@ void build_add_light(struct loader *ld, const struct light *l);
 vec3 build_to_float(dvec3 v);
 /* The point in the world; n and `what` it is are to blame if that is too far. */
 vec3 build_place(struct loader *ld, const xmlNode *n, const char *what, const mat4 *m, dvec3 p);
-/* The direction, made a unit vector, of n: what `what` lacks. */
-vec3 build_direction(struct loader *ld, const xmlNode *n, const char *what, dvec3 v);
+/* A unit vector along v, of n. */
+vec3 build_direction(struct loader *ld, const xmlNode *n, dvec3 v);
 /* A new object that the following triangles and spheres belong to. */
 void build_begin_object(struct loader *ld, const char *name, const char *symbol, uint32_t material,
                         bool is_lamp);

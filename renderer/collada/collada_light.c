@@ -5,8 +5,6 @@
 #include <float.h>
 #include <string.h>
 
-static const double PI = 3.14159265358979323846;
-
 /* The attenuation over metres. Pure inverse-square falloff is brought to the physical form {0, 0, 1},
  * where the value is an intensity. */
 static void read_attenuation(struct loader *ld, const xmlNode *n, struct light *l)
@@ -29,49 +27,37 @@ static void read_attenuation(struct loader *ld, const xmlNode *n, struct light *
 
 #define POINT "color constant_attenuation? linear_attenuation? quadratic_attenuation?"
 
-/* A light that shines from one place. */
-static void add_light_at(struct loader *ld, const xmlNode *n, const mat4 *m, struct light *l)
+/* <point>, or <spot>: a point light with a cone around its -Z. */
+static void add_point(struct loader *ld, const xmlNode *n, const mat4 *m)
 {
-    l->value = field_color(ld, n, "color", FLT_MAX);
-    l->position = build_place(ld, n, "the light", m, d3(0, 0, 0));
-    /* The assignment's point lights do not fall off, whatever the file says. */
-    if (ld->dialect == DIALECT_COLLADA)
-        read_attenuation(ld, n, l);
-    build_add_light(ld, l);
-}
-
-static void add_point(struct loader *ld, const xmlNode *n, const char *name, const mat4 *m)
-{
-    (void)name;
-    element_check(ld, n, POINT);
-    add_light_at(ld, n, m, &(struct light){.kind = LIGHT_POINT, .attenuation = {1, 0, 0}});
-}
-
-/* A point light with a cone around its -Z. */
-static void add_spot(struct loader *ld, const xmlNode *n, const char *name, const mat4 *m)
-{
-    struct light l = {.kind = LIGHT_SPOT};
-    (void)name;
-    if (ld->dialect == DIALECT_CGL)
+    bool is_spot = element_is(n, "spot"), is_cgl = ld->dialect == DIALECT_CGL;
+    struct light l = {.kind = is_spot ? LIGHT_SPOT : LIGHT_POINT, .attenuation = {1, 0, 0}};
+    if (is_spot && is_cgl)
         fail_at(ld, n, "spot lights of the assignment are not supported: they never shone");
-    element_check(ld, n, POINT " falloff_angle? falloff_exponent?");
-    double angle = field_number(ld, n, "falloff_angle", 180, 0.1, 180);
-    l.cos_cutoff = angle < 180 ? (float)cos(0.5 * angle * (PI / 180)) : 0;
-    l.exponent = (float)field_number(ld, n, "falloff_exponent", 0, 0, 1e6);
-    l.axis = neg(build_direction(ld, n, "the light", mat4_column(m, 2)));
-    add_light_at(ld, n, m, &l);
+    element_check(ld, n, is_spot ? POINT " falloff_angle? falloff_exponent?" : POINT);
+    l.value = field_color(ld, n, "color", FLT_MAX);
+    l.position = build_place(ld, n, "the light", m, d3(0, 0, 0));
+    /* The assignment's point lights do not fall off, whatever the file says. */
+    if (!is_cgl)
+        read_attenuation(ld, n, &l);
+    if (is_spot) {
+        double angle = field_number(ld, n, "falloff_angle", 180, 0.1, 180);
+        l.cos_cutoff = angle < 180 ? (float)cos(0.5 * angle * (PI / 180)) : 0;
+        l.exponent = (float)field_number(ld, n, "falloff_exponent", 0, 0, 1e6);
+        l.axis = neg(build_direction(ld, n, mat4_column(m, 2)));
+    }
+    build_add_light(ld, &l);
 }
 
 /* It shines along its -Z. The assignment takes the point (0,0,-1) with the translation for the
  * direction towards the light. */
-static void add_directional(struct loader *ld, const xmlNode *n, const char *name, const mat4 *m)
+static void add_directional(struct loader *ld, const xmlNode *n, const mat4 *m)
 {
-    (void)name;
     element_check(ld, n, "color");
     dvec3 to_light = ld->dialect == DIALECT_CGL ? mat4_point(m, d3(0, 0, -1)) : mat4_column(m, 2);
     build_add_light(ld, &(struct light){.kind = LIGHT_DIRECTIONAL,
                                         .value = field_color(ld, n, "color", FLT_MAX),
-                                        .to_light = build_direction(ld, n, "the light", to_light)});
+                                        .to_light = build_direction(ld, n, to_light)});
 }
 
 /* A rectangle that emits to its -Z side is geometry: so what light sampling aims at and what a ray
@@ -80,8 +66,7 @@ static void add_lamp(struct loader *ld, const xmlNode *n, const char *name, cons
                      double width, double height, rgb radiance)
 {
     struct material lamp = {.kind = MATERIAL_DIFFUSE, .radiance = radiance};
-    double sign = build_transform_sign(ld, n, m);
-    double x = width / 2, y = height / 2;
+    double sign = build_transform_sign(ld, n, m), x = width / 2, y = height / 2;
     unsigned dropped = ld->scene.num_degenerate;
     build_copy_name(lamp.name, sizeof lamp.name, name);
     build_begin_object(ld, name, NULL, build_add_material(ld, &lamp), true);
@@ -95,23 +80,18 @@ static void add_lamp(struct loader *ld, const xmlNode *n, const char *name, cons
         fail_at(ld, n, "the light has no area");
 }
 
+/* <rectangle>, or the assignment's <area>, which is 1 x 1. */
 static void add_rectangle(struct loader *ld, const xmlNode *n, const char *name, const mat4 *m)
 {
-    element_check(ld, n, "radiance width height");
-    add_lamp(ld, n, name, m, field_number(ld, n, "width", 0, ANY_LENGTH),
-             field_number(ld, n, "height", 0, ANY_LENGTH), field_color(ld, n, "radiance", FLT_MAX));
+    bool is_area = element_is(n, "area");
+    element_check(ld, n, is_area ? "color" : "radiance width height");
+    add_lamp(ld, n, name, m, field_number(ld, n, "width", 1, ANY_LENGTH),
+             field_number(ld, n, "height", 1, ANY_LENGTH),
+             field_color(ld, n, is_area ? "color" : "radiance", FLT_MAX));
 }
 
-static void add_area(struct loader *ld, const xmlNode *n, const char *name, const mat4 *m)
+static void add_ambient(struct loader *ld, const xmlNode *n)
 {
-    element_check(ld, n, "color");
-    add_lamp(ld, n, name, m, 1, 1, field_color(ld, n, "color", FLT_MAX));
-}
-
-static void add_ambient(struct loader *ld, const xmlNode *n, const char *name, const mat4 *m)
-{
-    (void)name;
-    (void)m;
     element_check(ld, n, "color");
     rgb color = field_color(ld, n, "color", FLT_MAX);
     if (rgb_is_zero(ld->ambient) && !rgb_is_zero(color))
@@ -129,16 +109,6 @@ void light_finish(struct loader *ld)
     if (ld->scene.environment == NULL)
         fail_memory(ld);
 }
-
-/* To support one more, give it a reader here. A technique of no profile is <technique_common>. */
-static const struct light_tag {
-    const char *profiles, *name;
-    void (*add)(struct loader *ld, const xmlNode *n, const char *name, const mat4 *m);
-} LIGHT_TAGS[] = {
-    {"ASSAY", "rectangle", add_rectangle},  {"CGL", "area", add_area},
-    {"CGL common", "point", add_point},     {"CGL common", "directional", add_directional},
-    {"CGL common", "ambient", add_ambient}, {"CGL common", "spot", add_spot},
-};
 
 /* What Blender's exporter wrote beside, from 2.80 on, of a light that is as it wrote it; else NULL. */
 static const xmlNode *blender_technique(const struct loader *ld, const xmlNode *light,
@@ -196,25 +166,24 @@ void light_instance(struct loader *ld, const xmlNode *instance, const xmlNode *l
     build_transform_sign(ld, instance, m);
     const xmlNode *own = element_own_technique(ld, light),
                   *technique = own != NULL ? own : element_child(light, "technique_common"),
-                  *kind = element_first_child(technique);
-    const char *profile = own != NULL ? element_attribute(own, "profile") : "common";
+                  *kind = element_first(technique);
     if (technique == NULL)
         fail_at(ld, light, "<light> without <technique_common>");
-    else if (kind == NULL)
-        fail_at(ld, technique, "<light> without a kind");
-    else if (element_next_sibling(kind) != NULL)
-        element_fail_unexpected(ld, element_next_sibling(kind));
-    if (ld->failed)
-        return;
+    if (own == NULL)
+        element_check(ld, technique, "point|spot|directional|ambient");
+    else if (strcmp(element_attribute(own, "profile"), "CGL") == 0)
+        element_check(ld, own, "area|point|spot|directional|ambient");
+    else
+        element_check(ld, own, "rectangle");
+    if (element_is_one_of(kind, "rectangle area"))
+        add_rectangle(ld, kind, node_name, m);
+    else if (element_is(kind, "directional"))
+        add_directional(ld, kind, m);
+    else if (element_is(kind, "ambient"))
+        add_ambient(ld, kind);
+    else
+        add_point(ld, kind, m);
     const xmlNode *blender = own == NULL ? blender_technique(ld, light, kind) : NULL;
-    for (size_t i = 0; i < sizeof LIGHT_TAGS / sizeof *LIGHT_TAGS; i++) {
-        if (!element_is(kind, LIGHT_TAGS[i].name) ||
-            strstr(LIGHT_TAGS[i].profiles, profile) == NULL)
-            continue;
-        LIGHT_TAGS[i].add(ld, kind, node_name, m);
-        if (blender != NULL)
-            mean_blender(ld, blender, node_name, m);
-        return;
-    }
-    element_fail_unexpected(ld, kind);
+    if (blender != NULL && !ld->failed)
+        mean_blender(ld, blender, node_name, m);
 }

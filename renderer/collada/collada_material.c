@@ -3,18 +3,17 @@
 
 #include <string.h>
 
-/* What a channel of a shader says, itself (by the element `own`) or by a parameter of one of those
- * kinds; a line for a texture. NULL: nothing. */
+/* What a channel of a shader says, itself or by a parameter; a line for a texture. NULL: nothing. */
 static const xmlNode *find_value(struct loader *ld, const xmlNode *shader, const char *name,
-                                 const char *own, const char *kinds)
+                                 bool is_color)
 {
-    const xmlNode *channel = element_child(shader, name), *value = element_first_child(channel);
-    bool is_color = strcmp(own, "color") == 0;
+    const xmlNode *channel = element_child(shader, name), *value = element_first(channel);
     if (channel == NULL ||
         !element_check(ld, channel, is_color ? "color|param|texture" : "float|param"))
         return NULL;
     if (element_is(value, "param"))
-        return parameter_get(ld, value, element_attribute(value, "ref"), kinds);
+        return parameter_get(ld, value, element_attribute(value, "ref"),
+                             is_color ? "float3 float4" : "float");
     if (element_is(value, "texture")) {
         parameter_get_texture(ld, value);
         fail_at(ld, value, "<%s> by <texture> is not supported%s", name,
@@ -23,63 +22,59 @@ static const xmlNode *find_value(struct loader *ld, const xmlNode *shader, const
     return value;
 }
 
-/* One channel of a shader: a missing element leaves *value and *alpha as they are. */
-static bool read_channel(struct loader *ld, const xmlNode *shader, const char *name, rgb *value,
-                         double *alpha)
+/* One channel of a shader: a missing element leaves *alpha as it is. */
+static rgb read_channel(struct loader *ld, const xmlNode *shader, const char *name, rgb missing,
+                        double *alpha)
 {
-    const xmlNode *color = find_value(ld, shader, name, "color", "float3 float4");
-    if (color != NULL)
-        text_read_color(ld, color, value, alpha);
-    return !ld->failed;
+    const xmlNode *color = find_value(ld, shader, name, true);
+    return color != NULL ? text_read_color(ld, color, alpha) : missing;
 }
 
-/* The same, or a <texture>: *value is then white. */
-static bool read_mapped_channel(struct loader *ld, const xmlNode *shader, const char *name,
-                                rgb *value, uint32_t *map)
+/* The same, or a <texture>: then white. */
+static rgb read_mapped_channel(struct loader *ld, const xmlNode *shader, const char *name,
+                               rgb missing, uint32_t *map)
 {
     const xmlNode *channel = element_child(shader, name),
                   *texture = element_child(channel, "texture");
     const char *other = ld->texcoord;
     if (texture == NULL)
-        return read_channel(ld, shader, name, value, NULL);
+        return read_channel(ld, shader, name, missing, NULL);
     element_check(ld, channel, "texture");
     *map = texture_get(ld, texture, &ld->texcoord);
-    *value = grey(1);
     if (other != NULL && (ld->texcoord == NULL || strcmp(ld->texcoord, other) != 0))
         fail_at(ld, texture, "a second set of texture coordinates in one material");
-    return !ld->failed;
+    return grey(1);
 }
 
-static bool read_factor(struct loader *ld, const xmlNode *shader, const char *name, double *value)
+static double read_factor(struct loader *ld, const xmlNode *shader, const char *name,
+                          double missing)
 {
-    const xmlNode *number = find_value(ld, shader, name, "float", "float");
+    const xmlNode *number = find_value(ld, shader, name, false);
     if (number != NULL)
-        text_read_exactly(ld, number, value, 1);
-    return !ld->failed;
+        text_read_numbers(ld, number, &missing, 1, 1);
+    return missing;
 }
 
 /* COLLADA 1.5 "Determining Transparency (Opacity)": all of the light passes, or none. */
-static bool read_opacity(struct loader *ld, const xmlNode *shader)
+static bool is_transparent(struct loader *ld, const xmlNode *shader)
 {
-    const xmlNode *transparent = element_child(shader, "transparent");
-    rgb color = grey(1);
-    double alpha = 1, factor = 1;
-    if (!read_channel(ld, shader, "transparent", &color, &alpha) ||
-        !read_factor(ld, shader, "transparency", &factor))
-        return false;
-    const char *mode = transparent != NULL ? element_attribute(transparent, "opaque") : NULL;
+    const xmlNode *transparent = element_child(shader, "transparent"),
+                  *factor = element_child(shader, "transparency");
+    const char *mode = element_attribute(transparent, "opaque");
+    double alpha = 1;
+    rgb color = read_channel(ld, shader, "transparent", grey(1), &alpha);
     mode = mode != NULL ? mode : "A_ONE";
-    bool by_alpha = mode[0] == 'A';
     if (element_place_among(mode, "A_ONE A_ZERO RGB_ONE RGB_ZERO") < 0)
-        return fail_at(ld, transparent, "unknown opaque=\"%.60s\"", mode);
-    double most = (by_alpha ? alpha : (double)rgb_max(color)) * factor,
-           least = (by_alpha ? alpha : (double)fminf(fminf(color.r, color.g), color.b)) * factor,
+        fail_at(ld, transparent, "unknown opaque=\"%.60s\"", mode);
+    bool by_alpha = mode[0] == 'A';
+    double scale = read_factor(ld, shader, "transparency", 1),
+           most = scale * (by_alpha ? alpha : (double)rgb_max(color)),
+           least = scale * (by_alpha ? alpha : (double)fminf(fminf(color.r, color.g), color.b)),
            opaque = strstr(mode, "_ONE") != NULL;
-    ld->is_transparent = most == 1 - opaque && least == most;
-    if (ld->is_transparent || (most == opaque && least == most))
-        return true;
-    return fail_at(ld, transparent != NULL ? transparent : element_child(shader, "transparency"),
-                   "transparency is not supported (--dialect cgl ignores it)");
+    if (least != most || (most != 0 && most != 1))
+        fail_at(ld, transparent != NULL ? transparent : factor,
+                "transparency is not supported (--dialect cgl ignores it)");
+    return most == 1 - opaque;
 }
 
 /* No channel of the three together is to be above 1. */
@@ -100,21 +95,18 @@ static void darken(struct loader *ld, struct material *m)
 
 /* The highlight of Blinn's (n.h)^shininess is as wide as Beckmann's of alpha^2 = 2/(shininess + 2) [Walter07, after
  * eq. 31], that of Phong's (r.v)^shininess as Blinn's of four times the exponent: r turns twice as fast as h. */
-static bool read_highlight(struct loader *ld, const xmlNode *shader, struct material *m)
+static void read_highlight(struct loader *ld, const xmlNode *shader, struct material *m)
 {
-    rgb reflective = grey(0);
-    double reflectivity = 1, shininess = 0;
-    if (!read_channel(ld, shader, "specular", &m->specular, NULL) ||
-        !read_factor(ld, shader, "shininess", &shininess) ||
-        !read_channel(ld, shader, "reflective", &reflective, NULL) ||
-        !read_factor(ld, shader, "reflectivity", &reflectivity))
-        return false;
-    m->mirror = rgb_scale(reflective, (float)fmax(0, reflectivity));
+    const double shininess = read_factor(ld, shader, "shininess", 0),
+                 reflectivity = read_factor(ld, shader, "reflectivity", 1);
+    m->specular = read_channel(ld, shader, "specular", grey(0), NULL);
+    m->mirror = rgb_scale(read_channel(ld, shader, "reflective", grey(0), NULL),
+                          (float)fmax(0, reflectivity));
     const bool shines = !rgb_is_zero(m->specular), mirrors = !rgb_is_zero(m->mirror);
     if (shines && element_is(shader, "lambert"))
-        return fail_at(ld, element_child(shader, "specular"), "a <lambert> that is <specular>");
-    if (!shines && !mirrors)
-        return true;
+        fail_at(ld, element_child(shader, "specular"), "a <lambert> that is <specular>");
+    if (ld->failed || (!shines && !mirrors))
+        return;
     const double n = fmax(0, shininess) * (element_is(shader, "phong") ? 4 : 1);
     m->alpha = fmaxf(MICROFACET_MIN_ALPHA, (float)sqrt(2 / (n + 2)));
     m->microfacet = MICROFACET_BECKMANN;
@@ -122,61 +114,54 @@ static bool read_highlight(struct loader *ld, const xmlNode *shader, struct mate
     m->kind = MATERIAL_PLASTIC;
     darken(ld, m);
     if (!rgb_is_zero(m->reflectance) || (shines && mirrors))
-        return true;
+        return;
     m->kind = shines ? MATERIAL_MICROFACET : MATERIAL_MIRROR;
     m->reflectance = shines ? m->specular : m->mirror;
     m->specular = m->mirror = grey(0);
-    return true;
 }
 
 /* What the assignment does not look at may be anything; only for the note. */
 static bool has_highlight(const struct loader *ld, const xmlNode *shader)
 {
-    struct err ignored;
     struct loader quiet = *ld;
-    rgb specular = grey(0);
     const xmlNode *channel = element_child(shader, "specular"),
                   *color = element_child(channel, "color");
-    quiet.err = &ignored;
-    if (color != NULL && text_read_color(&quiet, color, &specular, NULL))
-        return !rgb_is_zero(specular);
-    return channel != NULL;
+    quiet.err = NULL;
+    return color != NULL ? !rgb_is_zero(text_read_color(&quiet, color, NULL)) : channel != NULL;
 }
 
-static bool read_shader(struct loader *ld, const xmlNode *shader, struct material *m)
+static void read_shader(struct loader *ld, const xmlNode *shader, struct material *m)
 {
-    bool is_constant = element_is(shader, "constant");
+    bool is_constant = element_is(shader, "constant"), is_cgl = ld->dialect == DIALECT_CGL;
     element_check(ld, shader,
                   is_constant ? "emission? reflective? reflectivity? transparent? transparency? "
                                 "index_of_refraction?"
                               : "emission? ambient? diffuse? specular? shininess? reflective? "
                                 "reflectivity? transparent? transparency? index_of_refraction?");
-    m->reflectance = grey(ld->dialect == DIALECT_CGL && !is_constant ? 0.5f : 0);
+    m->reflectance = read_mapped_channel(
+        ld, shader, "diffuse", grey(is_cgl && !is_constant ? 0.5f : 0), &m->reflectance_map);
+    m->radiance = read_mapped_channel(ld, shader, "emission", grey(0), &m->radiance_map);
     m->radiance_both_sides = true;
-    if (!read_mapped_channel(ld, shader, "diffuse", &m->reflectance, &m->reflectance_map) ||
-        !read_mapped_channel(ld, shader, "emission", &m->radiance, &m->radiance_map))
-        return false;
     if (rgb_max(m->reflectance) > 1)
-        return fail_at(ld, element_child(shader, "diffuse"), "diffuse reflectance above 1");
-    if (ld->dialect == DIALECT_COLLADA)
-        return read_opacity(ld, shader) && (ld->is_transparent || read_highlight(ld, shader, m));
-    if (!rgb_is_zero(m->radiance))
-        return fail_at(ld, element_child(shader, "emission"),
-                       "the assignment has no emission in profile_COMMON: use a technique of "
-                       "profile CGL");
-    ld->num_specular += has_highlight(ld, shader);
-    return true;
+        fail_at(ld, element_child(shader, "diffuse"), "diffuse reflectance above 1");
+    if (is_cgl && !rgb_is_zero(m->radiance))
+        fail_at(ld, element_child(shader, "emission"),
+                "the assignment has no emission in profile_COMMON: use a technique of profile CGL");
+    ld->num_specular += is_cgl && has_highlight(ld, shader);
+    ld->is_transparent = !is_cgl && is_transparent(ld, shader);
+    if (!is_cgl && !ld->is_transparent)
+        read_highlight(ld, shader, m);
 }
 
 static void read_common(struct loader *ld, const xmlNode *common, struct material *m)
 {
     element_check(ld, common, "asset? image* newparam* technique extra*");
     const xmlNode *technique = element_child(common, "technique"),
-                  *shader = element_first_child(technique);
+                  *shader = element_first(technique);
     element_check(ld, technique,
                   "asset? annotate* image* newparam* extra* lambert|phong|blinn|constant");
     while (shader != NULL && !element_is_one_of(shader, "lambert phong blinn constant"))
-        shader = element_next_sibling(shader);
+        shader = element_next(shader);
     if (!ld->failed)
         read_shader(ld, shader, m);
 }
@@ -221,11 +206,9 @@ static struct material_slot slot_get(struct loader *ld, const xmlNode *material)
         if (ld->slots[i].node == material)
             return ld->slots[i];
     struct material_slot slot = {.node = material, .index = NO_SURFACE};
-    struct material m = {
-        .name = "default",
-        .kind = MATERIAL_DIFFUSE,
-        .reflectance = grey(ld->dialect == DIALECT_CGL ? 0.5f : 0.8f),
-    };
+    struct material m = {.name = "default",
+                         .kind = MATERIAL_DIFFUSE,
+                         .reflectance = grey(ld->dialect == DIALECT_CGL ? 0.5f : 0.8f)};
     ld->texcoord = NULL;
     if (material != NULL)
         read_material(ld, material, &m);
@@ -246,7 +229,7 @@ static const xmlNode *find_bindings(struct loader *ld, const xmlNode *instance)
     element_check(ld, instance, "bind_material? extra*");
     element_check(ld, bind, "param* technique_common? technique* extra*");
     element_check(ld, common, "instance_material*");
-    return element_first_child(common);
+    return element_first(common);
 }
 
 uint32_t material_get(struct loader *ld, const xmlNode *instance, const xmlNode *user,
@@ -254,7 +237,7 @@ uint32_t material_get(struct loader *ld, const xmlNode *instance, const xmlNode 
 {
     bool is_cgl = ld->dialect == DIALECT_CGL;
     const xmlNode *first = find_bindings(ld, instance), *match = NULL;
-    for (const xmlNode *c = first; c != NULL && !ld->failed; c = element_next_sibling(c)) {
+    for (const xmlNode *c = first; c != NULL && !ld->failed; c = element_next(c)) {
         const char *s = element_needed_attribute(ld, c, "symbol");
         element_check(ld, c, "bind* bind_vertex_input* extra*");
         if (symbol != NULL && strcmp(s, symbol) != 0)

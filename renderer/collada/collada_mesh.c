@@ -5,11 +5,35 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* How the corners of a <p> make polygons. */
+enum cut { CUT_TRIANGLES, CUT_BY_VCOUNT, CUT_WHOLE, CUT_STRIP, CUT_FAN };
+static const struct {
+    const char *name, *children;
+    enum cut cut;
+} KINDS[] = {
+    {"triangles", "input* p? extra*", CUT_TRIANGLES},
+    {"polylist", "input* vcount? p? extra*", CUT_BY_VCOUNT},
+    {"polygons", "input* p* extra*", CUT_WHOLE},
+    {"tristrips", "input* p* extra*", CUT_STRIP},
+    {"trifans", "input* p* extra*", CUT_FAN},
+};
+
 /* One polygon at work. */
 struct polygon {
     struct corner corners[MAX_POLYGON_CORNERS];
     dvec3 points[MAX_POLYGON_CORNERS];
     uint32_t index[3 * MAX_POLYGON_CORNERS];
+};
+
+/* A mesh at work, and its primitive. */
+struct work {
+    struct mesh *mesh;
+    struct sources all;
+    enum cut cut;
+    struct inputs in;
+    struct uints sizes; /* CUT_BY_VCOUNT */
+    size_t found;       /* polygons */
+    struct polygon *polygon;
 };
 
 void mesh_release(struct mesh *m)
@@ -23,10 +47,10 @@ void mesh_release(struct mesh *m)
 #define MOST_UV 1e6
 
 /* What an input says of a corner of these indices; `what` it is. */
-static dvec3 look_up(struct loader *ld, const xmlNode *p, const struct sources *all,
+static dvec3 look_up(struct loader *ld, const xmlNode *p, const struct work *w,
                      const struct input *in, const uint32_t *numbers, const char *what)
 {
-    const struct source *s = &all->data[in->source];
+    const struct source *s = &w->all.data[in->source];
     uint32_t i = numbers[in->offset];
     if (i >= s->count) {
         fail_at(ld, p, "%s index %u out of range: there are %u", what, i, (unsigned)s->count);
@@ -37,18 +61,19 @@ static dvec3 look_up(struct loader *ld, const xmlNode *p, const struct sources *
 }
 
 /* Of the indices in `numbers`. */
-static struct corner read_corner(struct loader *ld, struct mesh *m, const xmlNode *p,
-                                 const struct sources *all, const struct inputs *in,
+static struct corner read_corner(struct loader *ld, const xmlNode *p, const struct work *w,
                                  const uint32_t *numbers)
 {
+    struct mesh *m = w->mesh;
+    const struct inputs *in = &w->in;
     struct corner c = {.uv = (uint32_t)m->num_uv};
-    dvec3 x = look_up(ld, p, all, &in->position, numbers, "vertex");
+    dvec3 x = look_up(ld, p, w, &in->position, numbers, "vertex");
     if (fabs(x.x) > FARTHEST || fabs(x.y) > FARTHEST || fabs(x.z) > FARTHEST)
         fail_at(ld, p, "vertex %u: a coordinate is beyond %g", numbers[in->position.offset],
                 FARTHEST);
     c.position = x;
     for (size_t k = 0; k < in->num_uv; k++) {
-        x = look_up(ld, p, all, &in->uv[k], numbers, "texture coordinate");
+        x = look_up(ld, p, w, &in->uv[k], numbers, "texture coordinate");
         if (fabs(x.x) > MOST_UV || fabs(x.y) > MOST_UV || m->num_uv >= UINT32_MAX)
             fail_at(ld, p, "texture coordinate %u is beyond %g", numbers[in->uv[k].offset],
                     MOST_UV);
@@ -58,41 +83,13 @@ static struct corner read_corner(struct loader *ld, struct mesh *m, const xmlNod
     }
     if (!in->normal.present)
         return c;
-    x = look_up(ld, p, all, &in->normal, numbers, "normal");
-    if (d3_normalize(&x)) {
-        c.normal[0] = (float)x.x;
-        c.normal[1] = (float)x.y;
-        c.normal[2] = (float)x.z;
-    } else {
+    x = look_up(ld, p, w, &in->normal, numbers, "normal");
+    if (d3_normalize(&x))
+        c.normal = build_to_float(x);
+    else
         ld->scene.num_zero_normals++;
-    }
     return c;
 }
-
-/* How the corners of a <p> make polygons. */
-enum cut { CUT_TRIANGLES, CUT_BY_VCOUNT, CUT_WHOLE, CUT_STRIP, CUT_FAN, CUT_NOTHING };
-static const struct primitive_kind {
-    const char *name, *children;
-    enum cut cut;
-} KINDS[] = {
-    {"triangles", "input* p? extra*", CUT_TRIANGLES},
-    {"polylist", "input* vcount? p? extra*", CUT_BY_VCOUNT},
-    {"polygons", "input* p* extra*", CUT_WHOLE},
-    {"tristrips", "input* p* extra*", CUT_STRIP},
-    {"trifans", "input* p* extra*", CUT_FAN},
-    {"lines", NULL, CUT_NOTHING},
-    {"linestrips", NULL, CUT_NOTHING},
-};
-
-/* What reading one primitive needs. */
-struct primitive {
-    const struct primitive_kind *kind;
-    const struct sources *all;
-    struct inputs in;
-    struct polygon *work;
-    struct uints sizes; /* CUT_BY_VCOUNT */
-    size_t found;       /* polygons */
-};
 
 /* The place in <p> of corner k of the polygon that begins at corner `at`. Every other triangle of a
  * strip runs backwards. */
@@ -104,29 +101,26 @@ static size_t corner_of(enum cut cut, size_t at, size_t k)
 }
 
 /* A polygon of n corners into triangles of the mesh. */
-static void add_polygon(struct loader *ld, struct mesh *m, const xmlNode *p, struct primitive *of,
+static void add_polygon(struct loader *ld, const xmlNode *p, struct work *w,
                         const uint32_t *numbers, size_t at, size_t n)
 {
-    size_t which = of->found++;
-    struct polygon *work = of->work;
-    if (n < 3 || n > MAX_POLYGON_CORNERS) {
+    struct mesh *m = w->mesh;
+    struct polygon *work = w->polygon;
+    size_t which = w->found++;
+    if (n < 3 || n > MAX_POLYGON_CORNERS)
         fail_at(ld, p, "polygon %zu has %zu corners; 3 to %d are supported", which, n,
                 MAX_POLYGON_CORNERS);
-        return;
-    }
     for (size_t k = 0; k < n && !ld->failed; k++) {
-        const uint32_t *corner = numbers + corner_of(of->kind->cut, at, k) * of->in.stride;
-        work->corners[k] = read_corner(ld, m, p, of->all, &of->in, corner);
+        size_t corner = corner_of(w->cut, at, k);
+        work->corners[k] = read_corner(ld, p, w, numbers + corner * w->in.stride);
         work->points[k] = work->corners[k].position;
     }
     if (ld->failed)
         return;
-    switch (triangulate(work->points, (uint32_t)n, work->index)) {
-    case TRIANGULATE_OK:
-    case TRIANGULATE_FLAT: break;
-    case TRIANGULATE_CROSSED: ld->num_left_out[LEFT_OUT_CROSSED]++; break;
-    case TRIANGULATE_MEMORY: fail_memory(ld); return;
-    }
+    enum triangulate_result result = triangulate(work->points, (uint32_t)n, work->index);
+    ld->num_left_out[LEFT_OUT_CROSSED] += result == TRIANGULATE_CROSSED;
+    if (result == TRIANGULATE_MEMORY)
+        fail_memory(ld);
     for (size_t t = 0; t < n - 2; t++) {
         if (m->num_triangles >= MAX_TRIANGLES)
             fail_at(ld, p, "more than %d triangles", MAX_TRIANGLES);
@@ -140,69 +134,62 @@ static void add_polygon(struct loader *ld, struct mesh *m, const xmlNode *p, str
 }
 
 /* One <p>. */
-static void read_p(struct loader *ld, struct mesh *m, const xmlNode *node, struct primitive *of)
+static void read_p(struct loader *ld, const xmlNode *node, struct work *w)
 {
     struct uints p = {NULL, 0};
-    enum cut cut = of->kind->cut;
-    bool slides = cut == CUT_STRIP || cut == CUT_FAN;
+    bool slides = w->cut == CUT_STRIP || w->cut == CUT_FAN;
     text_read_uints(ld, node, &p);
-    size_t corners = p.count / of->in.stride, at = 0;
-    if (p.count % of->in.stride != 0)
+    size_t corners = p.count / w->in.stride, at = 0;
+    if (p.count % w->in.stride != 0)
         fail_at(ld, node, "<p> has %zu indices, which is not a multiple of %llu", p.count,
-                (unsigned long long)of->in.stride);
+                (unsigned long long)w->in.stride);
     while (!ld->failed && at < corners - (slides && corners > 2 ? 2 : 0)) {
         size_t left = corners - at, n = slides && left < 3 ? left : 3;
-        if (cut == CUT_WHOLE)
+        if (w->cut == CUT_WHOLE)
             n = corners;
-        if (cut == CUT_BY_VCOUNT)
-            n = of->found < of->sizes.count ? of->sizes.data[of->found] : left + 1;
+        if (w->cut == CUT_BY_VCOUNT)
+            n = w->found < w->sizes.count ? w->sizes.data[w->found] : left + 1;
         if (n <= left)
-            add_polygon(ld, m, node, of, p.data, at, n);
+            add_polygon(ld, node, w, p.data, at, n);
         else
             fail_at(ld, node, "<p> has %zu corners, which do not end with polygon %zu", corners,
-                    of->found);
+                    w->found);
         at += slides ? 1 : n;
     }
     free(p.data);
 }
 
-static void read_all_p(struct loader *ld, struct mesh *m, const xmlNode *primitive,
-                       struct primitive *of)
+static void read_all_p(struct loader *ld, const xmlNode *primitive, struct work *w)
 {
     const xmlNode *vcount = element_child(primitive, "vcount");
     uint64_t count = element_count(ld, primitive, "count");
     size_t num_p = 0;
-    bool by_polygon = of->kind->cut == CUT_TRIANGLES || of->kind->cut == CUT_BY_VCOUNT;
+    bool by_polygon = w->cut == CUT_TRIANGLES || w->cut == CUT_BY_VCOUNT;
     if (vcount != NULL)
-        text_read_uints(ld, vcount, &of->sizes);
-    if (of->kind->cut == CUT_BY_VCOUNT && of->sizes.count != count)
+        text_read_uints(ld, vcount, &w->sizes);
+    if (w->cut == CUT_BY_VCOUNT && w->sizes.count != count)
         fail_at(ld, vcount != NULL ? vcount : primitive,
-                "<vcount> has %zu numbers, the count is %llu", of->sizes.count,
+                "<vcount> has %zu numbers, the count is %llu", w->sizes.count,
                 (unsigned long long)count);
-    for (const xmlNode *c = element_first_child(primitive); c != NULL && !ld->failed;
-         c = element_next_sibling(c)) {
+    for (const xmlNode *c = element_first(primitive); c != NULL && !ld->failed;
+         c = element_next(c)) {
         if (!element_is(c, "p"))
             continue;
         num_p++;
-        read_p(ld, m, c, of);
+        read_p(ld, c, w);
     }
-    size_t found = by_polygon ? of->found : num_p;
+    size_t found = by_polygon ? w->found : num_p;
     if (found != count)
-        fail_at(ld, primitive, "<%s> has %zu %s, its count says %llu", of->kind->name, found,
-                by_polygon ? "polygons" : "<p>", (unsigned long long)count);
+        fail_at(ld, primitive, "<%s> has %zu %s, its count says %llu",
+                (const char *)primitive->name, found, by_polygon ? "polygons" : "<p>",
+                (unsigned long long)count);
 }
 
-static void read_primitive(struct loader *ld, struct mesh *m, const xmlNode *primitive,
-                           const struct primitive_kind *kind, struct sources *all,
-                           struct polygon *work)
+static void read_primitive(struct loader *ld, const xmlNode *primitive, struct work *w)
 {
-    struct primitive of = {.kind = kind, .all = all, .work = work};
-    if (kind->cut == CUT_NOTHING) {
-        ld->num_left_out[LEFT_OUT_LINES]++;
-        return;
-    }
-    element_check(ld, primitive, kind->children);
-    of.in = source_read_inputs(ld, all, primitive);
+    struct mesh *m = w->mesh;
+    w->in = source_read_inputs(ld, &w->all, primitive);
+    w->found = w->sizes.count = 0;
     m->groups = build_grow(ld, m->groups, sizeof *m->groups, m->num_groups);
     if (ld->failed)
         return;
@@ -210,32 +197,34 @@ static void read_primitive(struct loader *ld, struct mesh *m, const xmlNode *pri
     *g = (struct mesh_group){.symbol = element_attribute(primitive, "material"),
                              .node = primitive,
                              .first = m->num_triangles,
-                             .num_uv = of.in.num_uv};
-    for (size_t k = 0; k < of.in.num_uv; k++)
-        g->uv_set[k] = of.in.uv[k].set;
-    read_all_p(ld, m, primitive, &of);
-    free(of.sizes.data);
+                             .num_uv = w->in.num_uv};
+    for (size_t k = 0; k < w->in.num_uv; k++)
+        g->uv_set[k] = w->in.uv[k].set;
+    read_all_p(ld, primitive, w);
     g->count = m->num_triangles - g->first;
 }
 
 static void read_mesh(struct loader *ld, struct mesh *m, const xmlNode *node)
 {
-    struct sources all = {NULL, 0};
-    struct polygon *work = malloc(sizeof *work);
-    if (work == NULL)
+    element_check(ld, node,
+                  "source* vertices* triangles* polylist* polygons* tristrips* trifans* lines* "
+                  "linestrips* extra*");
+    struct work w = {.mesh = m, .polygon = malloc(sizeof *w.polygon)};
+    if (w.polygon == NULL)
         fail_memory(ld);
-    for (const xmlNode *c = element_first_child(node); !ld->failed && c != NULL;
-         c = element_next_sibling(c)) {
-        size_t k = 0;
-        while (k < sizeof KINDS / sizeof *KINDS && !element_is(c, KINDS[k].name))
-            k++;
-        if (k < sizeof KINDS / sizeof *KINDS)
-            read_primitive(ld, m, c, &KINDS[k], &all, work);
-        else if (!element_is_one_of(c, "source vertices extra"))
-            element_fail_unexpected(ld, c);
+    for (const xmlNode *c = element_first(node); !ld->failed && c != NULL; c = element_next(c)) {
+        ld->num_left_out[LEFT_OUT_LINES] += element_is_one_of(c, "lines linestrips");
+        for (size_t k = 0; k < sizeof KINDS / sizeof *KINDS; k++) {
+            if (!element_is(c, KINDS[k].name))
+                continue;
+            element_check(ld, c, KINDS[k].children);
+            w.cut = KINDS[k].cut;
+            read_primitive(ld, c, &w);
+        }
     }
-    source_release(&all);
-    free(work);
+    source_release(&w.all);
+    free(w.sizes.data);
+    free(w.polygon);
 }
 
 static void read_sphere(struct loader *ld, struct mesh *m, const xmlNode *technique)

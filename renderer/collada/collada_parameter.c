@@ -3,29 +3,17 @@
 
 #include <string.h>
 
-/* The child of n of that element whose attribute says `value`. */
-static const xmlNode *find_child(const xmlNode *n, const char *element, const char *attribute,
-                                 const char *value)
-{
-    for (const xmlNode *c = element_first_child(n); c != NULL; c = element_next_sibling(c)) {
-        const char *own = element_attribute(c, attribute);
-        if (element_is(c, element) && own != NULL && strcmp(own, value) == 0)
-            return c;
-    }
-    return NULL;
-}
-
 /* NULL: there is none of that name. */
 static const xmlNode *find(const struct loader *ld, const xmlNode *user, const char *sid)
 {
-    const xmlNode *n = find_child(ld->instance_effect, "setparam", "ref", sid);
+    const xmlNode *n = element_child_with(ld->instance_effect, "setparam", "ref", sid);
     for (; n == NULL && !element_is(user, "library_effects") && user->parent != NULL &&
            user->parent->type == XML_ELEMENT_NODE;
          user = user->parent)
-        n = find_child(user, "newparam", "sid", sid);
-    const xmlNode *value = element_first_child(n);
+        n = element_child_with(user, "newparam", "sid", sid);
+    const xmlNode *value = element_first(n);
     while (element_is_one_of(value, "annotate semantic modifier"))
-        value = element_next_sibling(value);
+        value = element_next(value);
     return value;
 }
 

@@ -3,6 +3,7 @@
 #include "renderer/base/fs.h"
 
 #include <errno.h>
+#include <libxml/uri.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -32,6 +33,7 @@ const xmlNode *reference_find(struct loader *ld, const xmlNode *n, const char *i
 static const struct document *open_beside(struct loader *ld, const xmlNode *n,
                                           const char *reference, size_t size)
 {
+    struct scene *s = &ld->scene;
     char resolved[PATH_MAX], other[PATH_MAX];
     struct path name = fs_path("%.*s", (int)size, reference);
     if (!element_document(n)->is_file || size >= PATH_MAX || reference[0] == '/' ||
@@ -40,19 +42,28 @@ static const struct document *open_beside(struct loader *ld, const xmlNode *n,
                 reference);
         return NULL;
     }
-    text_decode_percents(name.s);
+    xmlURIUnescapeString(name.s, 0, name.s);
     struct path path = fs_beside_file(element_document(n)->path, name.s);
     bool exists = realpath(path.s, resolved) != NULL;
     for (size_t i = 0; exists && i < ld->num_documents; i++)
         if (realpath(ld->documents[i]->path, other) != NULL && strcmp(other, resolved) == 0)
             return ld->documents[i];
-    struct text_input in = {.file = exists ? fs_open(path.s) : NULL};
-    if (in.file == NULL) {
+    FILE *file = exists ? fs_open(path.s) : NULL;
+    if (file == NULL) {
         fail_at(ld, n, "reference '%.200s': cannot read: %s", reference, strerror(errno));
         return NULL;
     }
-    const struct document *d = xml_open(ld, path.s, &in);
-    fclose(in.file);
+    const struct document *d = NULL;
+    char *kept = strdup(path.s);
+    s->documents = build_grow(ld, s->documents, sizeof *s->documents, s->num_documents);
+    if (kept == NULL || ld->failed) {
+        fail_memory(ld);
+        free(kept);
+    } else {
+        s->documents[s->num_documents++] = kept;
+        d = xml_open(ld, kept, file, true);
+    }
+    fclose(file);
     return d;
 }
 

@@ -17,8 +17,7 @@ static void read_params(struct loader *ld, const xmlNode *accessor, uint64_t str
 {
     uint64_t place = 0;
     element_check(ld, accessor, "param*");
-    for (const xmlNode *p = element_first_child(accessor); p != NULL;
-         p = element_next_sibling(p), place++) {
+    for (const xmlNode *p = element_first(accessor); p != NULL; p = element_next(p), place++) {
         const char *name = element_attribute(p, "name"), *type = element_attribute(p, "type");
         if (type != NULL && element_place_among(type, "float double") < 0)
             fail_at(ld, p, "<param> of type '%.60s' where numbers are needed", type);
@@ -78,20 +77,6 @@ static size_t get_source(struct loader *ld, struct sources *all, const xmlNode *
     return all->count - 1;
 }
 
-static void read_input(struct loader *ld, struct sources *all, const xmlNode *input,
-                       const uint64_t *of_vertex, struct inputs *in);
-
-static void read_vertices(struct loader *ld, struct sources *all, const xmlNode *vertices,
-                          uint64_t offset, struct inputs *in)
-{
-    element_check(ld, vertices, "input* extra*");
-    for (const xmlNode *c = element_first_child(vertices); c != NULL; c = element_next_sibling(c))
-        if (element_is(c, "input"))
-            read_input(ld, all, c, &offset, in);
-    if (!ld->failed && !in->position.present)
-        fail_at(ld, vertices, "<vertices> without an <input> of semantic 'POSITION'");
-}
-
 /* An <input> of a primitive, or of its <vertices>: then *of_vertex is where their index stands. What hangs on texture
  * coordinates shows nothing of its own, and unknown semantics mean something to some other program. Vertex colours do not
  * show in the assignment; elsewhere they would be expected to. */
@@ -128,18 +113,24 @@ static void read_input(struct loader *ld, struct sources *all, const xmlNode *in
         return;
     if (to->present)
         fail_at(ld, input, "a second <input> of semantic '%s'", semantic);
-    else if (to == &in->position && !one.by_vertex)
-        read_vertices(ld, all, reference_follow(ld, input, "source", "vertices"), one.offset, in);
-    else {
+    if (to != &in->position || one.by_vertex) {
         one.source = get_source(ld, all, input, to == &in->position || to == &in->normal ? 3 : 2);
         *to = one;
+        return;
     }
+    const xmlNode *vertices = reference_follow(ld, input, "source", "vertices");
+    element_check(ld, vertices, "input* extra*");
+    for (const xmlNode *c = element_first(vertices); c != NULL; c = element_next(c))
+        if (element_is(c, "input"))
+            read_input(ld, all, c, &one.offset, in);
+    if (!in->position.present)
+        fail_at(ld, vertices, "<vertices> without an <input> of semantic 'POSITION'");
 }
 
 struct inputs source_read_inputs(struct loader *ld, struct sources *all, const xmlNode *primitive)
 {
     struct inputs in = {0};
-    for (const xmlNode *c = element_first_child(primitive); c != NULL; c = element_next_sibling(c))
+    for (const xmlNode *c = element_first(primitive); c != NULL; c = element_next(c))
         if (element_is(c, "input"))
             read_input(ld, all, c, NULL, &in);
     if (!in.position.present)

@@ -11,7 +11,7 @@
 /* The parser leaves one text at most where there are no elements. */
 static const char *text_of(struct loader *ld, const xmlNode *n)
 {
-    const xmlNode *child = element_first_child(n);
+    const xmlNode *child = element_first(n);
     if (child != NULL)
         element_fail_unexpected(ld, child);
     return n != NULL && child == NULL && n->children != NULL ? (const char *)n->children->content
@@ -70,8 +70,8 @@ bool text_read_uints(struct loader *ld, const xmlNode *n, struct uints *out)
     return !ld->failed;
 }
 
-/* Between least and most numbers; those that are missing are 0. How many there were. */
-static size_t read_some(struct loader *ld, const xmlNode *n, double *out, size_t least, size_t most)
+size_t text_read_numbers(struct loader *ld, const xmlNode *n, double *out, size_t least,
+                         size_t most)
 {
     struct doubles d = {NULL, 0};
     text_read_doubles(ld, n, &d);
@@ -85,31 +85,16 @@ static size_t read_some(struct loader *ld, const xmlNode *n, double *out, size_t
     return d.count;
 }
 
-bool text_read_exactly(struct loader *ld, const xmlNode *n, double *out, size_t count)
-{
-    read_some(ld, n, out, count, count);
-    return !ld->failed;
-}
-
-bool text_read_up_to(struct loader *ld, const xmlNode *n, double *out, size_t most)
-{
-    read_some(ld, n, out, 1, most);
-    return !ld->failed;
-}
-
-bool text_read_color(struct loader *ld, const xmlNode *n, rgb *out, double *alpha)
+rgb text_read_color(struct loader *ld, const xmlNode *n, double *alpha)
 {
     double v[4];
-    size_t count = read_some(ld, n, v, 3, 4);
+    size_t count = text_read_numbers(ld, n, v, 3, 4);
     for (int i = 0; i < 3; i++)
         if (v[i] < 0 || v[i] > FLT_MAX)
             fail_at(ld, n, "<%.60s>: negative or too large: %g", (const char *)n->name, v[i]);
-    if (ld->failed)
-        return false;
-    *out = (rgb){(float)v[0], (float)v[1], (float)v[2]};
     if (alpha != NULL)
         *alpha = count == 4 ? v[3] : 1;
-    return true;
+    return ld->failed ? grey(0) : (rgb){(float)v[0], (float)v[1], (float)v[2]};
 }
 
 const char *text_read_word(struct loader *ld, const xmlNode *n)
@@ -123,22 +108,4 @@ const char *text_read_word(struct loader *ld, const xmlNode *n)
     if (word == NULL)
         fail_memory(ld);
     return word != NULL ? word : "";
-}
-
-static int hex_digit(char c)
-{
-    const char *digits = "0123456789abcdef", *at = c != '\0' ? strchr(digits, c | 0x20) : NULL;
-    return at != NULL ? (int)(at - digits) : -1;
-}
-
-void text_decode_percents(char *s)
-{
-    char *to = s;
-    for (; *s != '\0'; s++) {
-        int high = *s == '%' ? hex_digit(s[1]) : -1, low = high >= 0 ? hex_digit(s[2]) : -1;
-        bool escape = low >= 0 && high + low > 0;
-        *to++ = escape ? (char)(16 * high + low) : *s;
-        s += escape ? 2 : 0;
-    }
-    *to = '\0';
 }

@@ -4,7 +4,7 @@
 #include "renderer/base/fs.h"
 #include "renderer/image/image_oiio.h"
 
-#include <stdlib.h>
+#include <libxml/uri.h>
 #include <string.h>
 
 /* The file that a URI means: relative to the document's directory, or after file://. */
@@ -14,7 +14,7 @@ static struct path find_file(struct loader *ld, const xmlNode *n)
     struct path uri = fs_path("%s", rest != NULL ? rest + 3 : word);
     if (rest != NULL && strncmp(word, "file://", 7) != 0)
         fail_at(ld, n, "an image from '%.200s' is not supported", word);
-    text_decode_percents(uri.s);
+    xmlURIUnescapeString(uri.s, 0, uri.s);
     return rest != NULL || uri.s[0] == '/' ? uri : fs_beside_file(element_document(n)->path, uri.s);
 }
 
@@ -50,7 +50,7 @@ static void read_sampler(struct loader *ld, const xmlNode *sampler, struct textu
 {
     static const char WRAPS[] = "WRAP MIRROR CLAMP BORDER NONE";
     const xmlNode *border = element_child(sampler, "border_color");
-    rgb colour = grey(0);
+    rgb colour = border != NULL ? text_read_color(ld, border, NULL) : grey(0);
     int wrap[2] = {field_choice(ld, sampler, "wrap_s", WRAPS, TEXTURE_WRAP),
                    field_choice(ld, sampler, "wrap_t", WRAPS, TEXTURE_WRAP)},
         filter = field_choice(ld, sampler, "magfilter",
@@ -60,8 +60,6 @@ static void read_sampler(struct loader *ld, const xmlNode *sampler, struct textu
     for (int k = 0; k < 2; k++)
         t->wrap[k] = (enum texture_wrap)(wrap[k] < TEXTURE_BORDER ? wrap[k] : TEXTURE_BORDER);
     t->nearest = filter < 3;
-    if (border != NULL)
-        text_read_color(ld, border, &colour, NULL);
     if ((t->wrap[0] == TEXTURE_BORDER || t->wrap[1] == TEXTURE_BORDER) && !rgb_is_zero(colour))
         fail_at(ld, border, "a <border_color> that is not black is not supported");
 }
@@ -91,29 +89,16 @@ uint32_t texture_get(struct loader *ld, const xmlNode *texture, const char **tex
     return s->num_textures;
 }
 
-/* The set that the name is bound to; NULL: a file that binds nothing means its first. */
-static const xmlNode *find_binding(const xmlNode *binding, const char *texcoord)
-{
-    for (const xmlNode *c = element_first_child(binding); c != NULL && texcoord != NULL;
-         c = element_next_sibling(c)) {
-        const char *semantic = element_attribute(c, "semantic");
-        if (element_is(c, "bind_vertex_input") && semantic != NULL &&
-            strcmp(semantic, texcoord) == 0)
-            return c;
-    }
-    return NULL;
-}
-
+/* A file that binds nothing means the first. */
 size_t texture_find_set(struct loader *ld, const xmlNode *instance, const xmlNode *binding,
                         const char *texcoord, const struct mesh_group *g)
 {
-    const xmlNode *bound = find_binding(binding, texcoord);
-    uint64_t set = bound != NULL ? element_count_or(ld, bound, "input_set", 0) : 0;
-    if (g == NULL || g->num_uv == 0) {
+    const xmlNode *bound = element_child_with(binding, "bind_vertex_input", "semantic", texcoord);
+    uint64_t set = element_count_or(ld, bound, "input_set", 0);
+    const size_t count = g != NULL ? g->num_uv : 0;
+    if (count == 0)
         fail_at(ld, instance, "a texture on a surface without texture coordinates");
-        return 0;
-    }
-    for (size_t k = 0; k < g->num_uv; k++)
+    for (size_t k = 0; k < count; k++)
         if (bound == NULL || g->uv_set[k] == set)
             return k;
     fail_at(ld, binding, "no set %llu of texture coordinates", (unsigned long long)set);

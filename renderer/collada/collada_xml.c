@@ -30,27 +30,18 @@ typedef const xmlError *xml_complaint;
 typedef xmlError *xml_complaint;
 #endif
 
-/* Of those that follow the first most are its consequences. */
-static void complain(struct loader *ld, xml_complaint error)
+/* What the parser says, and what the library says without saying of which parser, that memory is out above all: it goes
+ * on then, and may leave something out of the tree. Without this it would print it, too. */
+static void complain(void *ctx, xml_complaint error)
 {
+    const xmlParserCtxt *ctxt = ctx; /* NULL while there is none */
     const char *text = error->message != NULL ? error->message : "malformed XML";
-    if (error->level >= XML_ERR_ERROR && error->code == XML_ERR_NO_MEMORY)
-        fail_memory(ld);
-    else if (error->level >= XML_ERR_ERROR)
-        fail_line(ld, NULL, error->line, "not well-formed: %.*s", (int)strcspn(text, "\n"), text);
-}
-
-static void parse_error(void *ctx, xml_complaint error)
-{
-    xmlParserCtxt *ctxt = ctx;
-    complain(ctxt->_private, error);
-}
-
-/* What the library says without saying of which parser, that memory is out above all: it goes on then, and may leave
- * something out of the tree. Without this it would print it, too. */
-static void library_error(void *ld, xml_complaint error)
-{
-    complain(ld, error);
+    if (ctxt == NULL || error->level < XML_ERR_ERROR)
+        return;
+    if (error->code == XML_ERR_NO_MEMORY)
+        fail_memory(ctxt->_private);
+    fail_line(ctxt->_private, NULL, error->line, "not well-formed: %.*s", (int)strcspn(text, "\n"),
+              text);
 }
 
 /* Without document types there are no entities to expand, so no entity bombs and no outside files.
@@ -75,48 +66,35 @@ static void comment(void *ctx, const xmlChar *text)
             xmlSAX2Characters(ctx, c, 1);
 }
 
-static void instruction(void *ctx, const xmlChar *target, const xmlChar *text)
-{
-    (void)target;
-    comment(ctx, text != NULL ? text : BAD_CAST "");
-}
-
 /* libxml2 asks for a few thousand bytes at a time, so the text is never in memory as a whole. */
 static int read_some(void *context, char *buffer, int size)
 {
-    struct text_input *in = context;
-    size_t n = (size_t)size;
-    if (in->file != NULL) {
-        n = fread(buffer, 1, n, in->file);
-        if (ferror(in->file))
-            fail_line(in->ld, NULL, 0, "cannot read: %s", strerror(errno));
-    } else {
-        n = n < in->size - in->taken ? n : in->size - in->taken;
-        memcpy(buffer, in->text + in->taken, n);
-    }
-    in->taken += n;
-    if (in->taken > MAX_FILE_BYTES)
-        fail_line(in->ld, NULL, 0, "larger than %d bytes", MAX_FILE_BYTES);
-    return in->ld->failed ? -1 : (int)n;
+    struct loader *ld = context;
+    size_t n = fread(buffer, 1, (size_t)size, ld->file);
+    if (ferror(ld->file))
+        fail_line(ld, NULL, 0, "cannot read: %s", strerror(errno));
+    if (ftell(ld->file) > MAX_FILE_BYTES)
+        fail_line(ld, NULL, 0, "larger than %d bytes", MAX_FILE_BYTES);
+    return ld->failed ? -1 : (int)n;
 }
 
-static bool parse(struct loader *ld, struct document *d, struct text_input *in)
+static bool parse(struct loader *ld, struct document *d)
 {
-    in->ld = ld;
-    xmlSetStructuredErrorFunc(ld, library_error); /* of this thread */
+    xmlSetStructuredErrorFunc(NULL, complain); /* of this thread */
     xmlParserCtxt *ctxt = xmlNewParserCtxt();
     if (ctxt != NULL) {
+        xmlSetStructuredErrorFunc(ctxt, complain);
         ctxt->_private = ld;
+        ctxt->sax->serror = complain;
         ctxt->sax->startElementNs = element_start;
         ctxt->sax->internalSubset = document_type;
-        ctxt->sax->serror = parse_error;
         ctxt->sax->comment = comment;
-        ctxt->sax->processingInstruction = instruction;
+        ctxt->sax->processingInstruction = NULL;
         ctxt->sax->cdataBlock = xmlSAX2Characters;
         /* HUGE lifts the limit of 10 MB for one text, which large meshes reach; what else it lifts
          * (depth, entities) is checked here. */
         d->doc =
-            xmlCtxtReadIO(ctxt, read_some, NULL, in, NULL, NULL, XML_PARSE_NONET | XML_PARSE_HUGE);
+            xmlCtxtReadIO(ctxt, read_some, NULL, ld, NULL, NULL, XML_PARSE_NONET | XML_PARSE_HUGE);
     }
     if (ctxt == NULL || ctxt->errNo == XML_ERR_NO_MEMORY)
         fail_memory(ld);
@@ -130,7 +108,7 @@ static bool parse(struct loader *ld, struct document *d, struct text_input *in)
 
 static void survey_texts(struct loader *ld, const xmlNode *n)
 {
-    if (element_first_child(n) == NULL)
+    if (element_first(n) == NULL)
         return;
     for (const xmlNode *c = n->children; c != NULL; c = c->next)
         if (c->type == XML_TEXT_NODE && c->content[strspn((char *)c->content, " \t\r\n")] != '\0')
@@ -145,7 +123,7 @@ static bool survey_element(struct loader *ld, const xmlNode *n, bool *has_cgl)
     if (ld->num_documents == 1)
         ld->has_textures |= element_is(n, "texture") || (url != NULL && url[0] != '#') ||
                             (target != NULL && target[0] != '#');
-    if (element_is(n, "asset") && element_first_child(n->parent) != n)
+    if (element_is(n, "asset") && element_first(n->parent) != n)
         fail_at(ld, n, "<asset> is not the first in <%.60s>", (const char *)n->parent->name);
     if (!element_is(n, "technique"))
         return strncmp((const char *)n->name, "profile_", 8) != 0 ||
@@ -188,8 +166,7 @@ static void survey(struct loader *ld, struct document *d, const xmlNode *n, int 
     if (!survey_element(ld, n, has_cgl))
         return;
     survey_texts(ld, n);
-    for (const xmlNode *c = element_first_child(n); c != NULL && !ld->failed;
-         c = element_next_sibling(c))
+    for (const xmlNode *c = element_first(n); c != NULL && !ld->failed; c = element_next(c))
         survey(ld, d, c, depth + 1, has_cgl);
 }
 
@@ -219,7 +196,7 @@ static double blender_version(const xmlNode *root)
     return is_blender ? strtod((const char *)text->content + 8, NULL) : 0;
 }
 
-const struct document *xml_open(struct loader *ld, const char *path, struct text_input *in)
+const struct document *xml_open(struct loader *ld, const char *path, FILE *file, bool is_file)
 {
     const char *main_path = ld->path;
     bool has_cgl = false;
@@ -231,19 +208,17 @@ const struct document *xml_open(struct loader *ld, const char *path, struct text
         return NULL;
     }
     ld->documents[ld->num_documents++] = d;
-    d->is_file = in->file != NULL;
-    d->path = strdup(path);
-    d->ids = xmlHashCreate(0);
-    if (d->path == NULL || d->ids == NULL) {
-        fail_memory(ld);
-        return NULL;
-    }
-    ld->path = d->path;
-    bool parsed = parse(ld, d, in);
+    d->is_file = is_file;
+    d->path = ld->path = path;
+    ld->file = file;
+    bool parsed = parse(ld, d);
     ld->path = main_path;
     if (!parsed)
         return NULL;
     d->doc->_private = d;
+    d->ids = xmlHashCreateDict(0, d->doc->dict);
+    if (d->ids == NULL)
+        fail_memory(ld);
     const xmlNode *root = xmlDocGetRootElement(d->doc);
     if (!check_root(ld, root))
         return NULL;

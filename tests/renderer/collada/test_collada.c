@@ -328,7 +328,7 @@ static void run_file(const char *path, int cases)
 
 TEST(geometry)
 {
-    run_file("tests/renderer/collada/geometry.cases", 40);
+    run_file("tests/renderer/collada/geometry.cases", 41);
 }
 TEST(materials)
 {
@@ -340,7 +340,7 @@ TEST(lights_and_cameras)
 }
 TEST(refused)
 {
-    run_file("tests/renderer/collada/refused.cases", 72);
+    run_file("tests/renderer/collada/refused.cases", 73);
 }
 
 TEST(microfacet_of_ours)
@@ -425,6 +425,14 @@ TEST(lines_are_right_far_down)
     free(text);
     dae_must_fail(d, DIALECT_AUTO, expected);
     free(nodes);
+}
+
+/* The nodes are in line 7, so the comment ends in line 8 and the word is in line 9. */
+TEST(line_behind_a_comment_in_a_text)
+{
+    dae_must_fail(
+        (struct dae){.nodes = "<node><translate>1 2 <!-- of\ntwo -->\nx</translate></node>"},
+        DIALECT_AUTO, "test.dae:9: <translate>: 'x' is not a finite number");
 }
 
 TEST(failure_leaves_the_scene_alone)
