@@ -93,8 +93,8 @@ static void darken(struct loader *ld, struct material *m)
     ld->num_left_out[LEFT_OUT_BRIGHT]++;
 }
 
-/* The highlight of Blinn's (n.h)^shininess is as wide as Beckmann's of alpha^2 = 2/(shininess + 2) [Walter07, after
- * eq. 31], that of Phong's (r.v)^shininess as Blinn's of four times the exponent: r turns twice as fast as h. */
+/* The highlight of Blinn's (n.h)^shininess is as wide as Beckmann's of alpha^2 = 2/(shininess + 2) [Walter07 5.2],
+ * that of Phong's (r.v)^shininess as Blinn's of four times the exponent: r turns twice as fast as h. */
 static void read_highlight(struct loader *ld, const xmlNode *shader, struct material *m)
 {
     const double shininess = read_factor(ld, shader, "shininess", 0),
