@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """c-ray.py SCENE SPP IMAGES OUT: IMAGES independent images of c-ray 0.6 of a scene as `assay export --engine mitsuba` writes it, as one
 EXR of moments (tools/docs/formats/moments-exr.md). With DIR in the place of SPP the files for c-ray are written to the folder OUT and
 nothing is rendered.
@@ -131,6 +130,7 @@ def load():
         getattr(c, f"cr_{name}").argtypes = [ctypes.c_void_p, *more] if name != "new_renderer" else []
     c.cr_new_renderer.restype, c.cr_load_json.restype = ctypes.c_void_p, ctypes.c_bool
     c.cr_renderer_get_result.restype = ctypes.POINTER(Bitmap)
+    c.cr_get_version.restype = ctypes.c_char_p
     c.cr_log_level_set(0)
     return c
 
@@ -180,6 +180,9 @@ def write_moments(path, images, spp):
 
 
 def main():
+    if sys.argv[1:] == ["--version"]:
+        print("c-ray", load().cr_get_version().decode())
+        return
     if len(sys.argv) != 5:
         sys.exit(__doc__)
     scene, spp, images, out = sys.argv[1:]

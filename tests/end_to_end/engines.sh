@@ -21,7 +21,7 @@ fi
 # translate NAME DAE OPTIONS: "$tmp/NAME" has what c-ray reads, "$tmp/NAME.json" the dump
 translate() {
     mkdir "$tmp/$1"
-    assay export --engine mitsuba -o "$tmp/$1.xml" "${@:2}" && assay export --engine cycles -o "$tmp/$1.json" "${@:2}" && "$driver" "$tmp/$1.xml" DIR 1 "$tmp/$1"
+    assay export --engine mitsuba -o "$tmp/$1.xml" "${@:2}" && assay export --engine cycles -o "$tmp/$1.json" "${@:2}" && python3 "$driver" "$tmp/$1.xml" DIR 1 "$tmp/$1"
 }
 tell "c-ray: scenes are translated" "$({ translate box -r 24 16 -m 3 reference/scenes/21_mirror.dae && translate cornell -r 24 16 -m 5 reference/scenes/41_cornell.dae &&
     translate lens -r 24 16 -m 0 -b 0.25 -d 3 reference/scenes/17_lens_step.dae; } 2>&1 >/dev/null)"
@@ -75,8 +75,8 @@ done
 sed -i 's/"FOV": /"FOV": 1/' "$tmp/lens/scene.json"
 tell "control: another angle is seen" "$(python3 "$tmp/held.py" "$tmp/lens" 2>&1 | grep -q '^angle' || echo "it is not")"
 assay export --engine mitsuba -o "$tmp/point.xml" reference/scenes/12_point_plane.dae >"$tmp/out"
-expect "c-ray: a library that is not there is said" 1 "^c-ray.py: /nowhere.*LIBC_RAY says where it is" env LIBC_RAY=/nowhere "$driver" "$tmp/box.xml" 1 1 "$tmp/x.exr"
-expect "c-ray: what it has not is said" 1 "^c-ray.py: c-ray has no light of the kind 'point'$" "$driver" "$tmp/point.xml" DIR 1 "$tmp/box"
+expect "c-ray: a library that is not there is said" 1 "^c-ray.py: /nowhere.*LIBC_RAY says where it is" env LIBC_RAY=/nowhere python3 "$driver" "$tmp/box.xml" 1 1 "$tmp/x.exr"
+expect "c-ray: what it has not is said" 1 "^c-ray.py: c-ray has no light of the kind 'point'$" python3 "$driver" "$tmp/point.xml" DIR 1 "$tmp/box"
 
 # Images 1, 2 and 6 times x, which is a pixel's number and a quarter for each channel: the mean is 3 x, the squares of what is left 14 x^2,
 # the cubes (-8 - 1 + 27) x^3, here of pixel 4.
