@@ -69,7 +69,7 @@ static bool make_grey(struct scene *s, int channel, struct err *e)
         rgb *const colours[] = {&m->reflectance, &m->transmittance, &m->specular,
                                 &m->mirror,      &m->eta,           &m->k,
                                 &m->radiance};
-        for (size_t k = 0; k < sizeof colours / sizeof *colours; k++)
+        for (int k = 0; k < 7; k++)
             *colours[k] = in_channel(*colours[k], channel);
     }
     for (uint32_t i = 0; i < s->num_lights; i++)
