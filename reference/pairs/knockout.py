@@ -12,7 +12,7 @@ import subprocess
 import sys
 import tempfile
 
-from pairs import Scene, rows, write, write_sky
+from pairs import Scene, rows, write, write_images
 from pairs_cover import is_seen
 
 ALPHA = "5e-6"  # of a claim of the suite, about
@@ -76,7 +76,7 @@ def main():
     os.chdir(os.path.join(os.path.dirname(os.path.abspath(__file__)), "../.."))
     found, failed = [], 0
     with tempfile.TemporaryDirectory() as folder:
-        write_sky(f"{folder}/pairs_sky.hdr")
+        write_images(folder)
         for row in rows():
             scene = Scene(row)
             if args.scenes and scene.name not in args.scenes:

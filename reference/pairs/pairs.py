@@ -3,12 +3,14 @@
 of the factors below, each as NN_name.dae, .json and .md; with --without that one scene with the level switched off.
 
 Sixteen scenes: an orthogonal array of the field of four elements, so that each two of its five columns (lights, world,
-camera, depth, mosaic) hold all sixteen combinations. Materials, geometries and, in the world "here", transforms go round the
+camera, depth, floor and mosaic) hold all sixteen combinations. Materials, geometries and, in the world "here", transforms go round the
 eight objects of each scene from one to the next."""
 import argparse
 import math
 import os
+import struct
 import sys
+import zlib
 
 from pairs_mesh import GEOMETRY, box, corners, quad
 from pairs_text import json_text, page
@@ -30,6 +32,8 @@ SIZES = {"near": (48, 36), "lens_tall": (39, 52), "far_tall": (36, 48), "lens_cl
 MATERIALS = ("diffuse", "mirror", "refraction", "glass", "coloured_glass", "ggx", "beckmann")
 GEOMETRIES = ("box", "sphere", "smooth", "instances", "slivers")
 TRANSFORMS = ("rigid", "mirrored", "uneven")
+FLOORS = ("plain", "texture_nearest", "texture_bilinear")
+WRAPS = {"texture_nearest": ("WRAP", "MIRROR", "NEAREST"), "texture_bilinear": ("CLAMP", "BORDER", "LINEAR")}
 # Where Cycles lights random facets by no point light, the sun or the hidden ambient light.
 WITHOUT_BECKMANN = ("ambient", "points")
 TILES = 17  # a side of the mosaic: 289 materials
@@ -42,11 +46,12 @@ TIMES = ((0, 0, 0, 0), (0, 1, 2, 3), (0, 2, 3, 1), (0, 3, 1, 2))
 
 
 def rows():
-    """(number, lights, world, camera, depth, has mosaic)"""
+    """(number, lights, world, camera, depth, has mosaic, floor)"""
     for i in range(16):
         a, b = divmod(i, 4)
-        yield (50 + i, LIGHTS[a], WORLDS[b], CAMERAS[a ^ b], DEPTHS[a ^ TIMES[2][b]],
-               a ^ TIMES[3][b] == 0)
+        last = a ^ TIMES[3][b]
+        floor = FLOORS[(1 + a % 2, 1, 2, 0)[last]]
+        yield (50 + i, LIGHTS[a], WORLDS[b], CAMERAS[a ^ b], DEPTHS[a ^ TIMES[2][b]], last == 0, floor)
 
 
 def tag(element, body, **attributes):
@@ -88,7 +93,7 @@ class Scene:
     """One row, written as text; `off` is a level that is left out."""
 
     def __init__(self, row, off=None):
-        self.number, self.lights, self.world, self.camera, self.depth, self.mosaic = row
+        self.number, self.lights, self.world, self.camera, self.depth, self.mosaic, self.floor = row
         self.row, self.off = row, off
         self.name = f"{self.number}_{self.lights}_{self.world}"
         self.cgl = self.lights == "ambient"
@@ -114,6 +119,13 @@ class Scene:
         return self.material(name, tag("profile_COMMON", tag("technique", tag("lambert", tag(
             "diffuse", tag("color", numbers(*colour, 1)))), sid="c")))
 
+    def textured(self, name, wrap_s, wrap_t, filter_):
+        sampler = tag("sampler2D", tag("source", "surface") + tag("wrap_s", wrap_s) + tag("wrap_t", wrap_t) +
+                      tag("minfilter", filter_) + tag("magfilter", filter_))
+        return self.material(name, tag("profile_COMMON", tag("newparam", tag("surface", tag(
+            "init_from", "picture"), type="2D"), sid="surface") + tag("newparam", sampler, sid="sampler") + tag(
+                "technique", tag("lambert", tag("diffuse", tag("texture", "", texture="sampler", texcoord="UV"))), sid="c")))
+
     def glow(self, name, radiance, sides):
         black = tag("lambert", tag("diffuse", tag("color", "0 0 0 1")))
         return self.material(name, tag("profile_COMMON", tag("technique", black, sid="c")) + extra(tag(
@@ -130,7 +142,9 @@ class Scene:
         if root is self.root:
             self.corners[part] += [apply(multiply(root, matrix), p) for p in corners(mesh)]
         instance = tag("instance_geometry", tag("bind_material", tag("technique_common", "".join(
-            f'<instance_material symbol="{s}" target="#M{m}"/>' for s, m in bind))), url="#G" + geometry)
+            f'<instance_material symbol="{s}" target="#M{m}"' +
+            ('><bind_vertex_input semantic="UV" input_semantic="TEXCOORD" input_set="0"/></instance_material>'
+             if mesh.uv else "/>") for s, m in bind))), url="#G" + geometry)
         if geometry == "instances":
             instance = self.clump(bind)
         self.nodes.append(tag("node", tag("matrix", text(multiply(root, matrix))) + instance, name=name))
@@ -184,8 +198,13 @@ class Scene:
         return multiply(multiply(translate(where), scale(*[RADIUS * u for u in uneven])), turned)
 
     def objects(self):
-        self.diffuse("floor", 0.55, 0.5, 0.45)
-        self.geometry("floor", quad((-1.2, 0, 0.6), (2.4, 0, 0), (0, 0, -1.4)))
+        uv = None
+        if self.has_texture():
+            self.textured("floor", *WRAPS[self.floor])
+            uv = [(-0.6, -0.4), (1.7, -0.4), (1.7, 1.3), (-0.6, 1.3)]
+        else:
+            self.diffuse("floor", 0.55, 0.5, 0.45)
+        self.geometry("floor", quad((-1.2, 0, 0.6), (2.4, 0, 0), (0, 0, -1.4), uv))
         # A world that is left out, of the objects alone.
         root = self.root if self.is_on(self.world) else scale(*[1 / self.unit] * 3)
         plan = [(self.materials[k % len(self.materials)],
@@ -421,6 +440,7 @@ class Scene:
             f'<asset><unit name="unit" meter="{self.unit:g}"/><up_axis>Y_UP</up_axis></asset>',
             tag("library_cameras", camera),
             tag("library_lights", "\n".join(self.light_library)) if self.light_library else "",
+            tag("library_images", tag("image", tag("init_from", TEXTURE), id="picture")) if self.has_texture() else "",
             tag("library_effects", "\n".join(tag("effect", body, id="E" + name) for name, body in self.effects)),
             tag("library_materials", "\n".join(
                 tag("material", f'<instance_effect url="#E{name}"/>', id="M" + name) for name, _ in self.effects)),
@@ -437,19 +457,32 @@ class Scene:
         out = {"width": width, "height": height, "depth": depth}
         if self.lights == "image" and self.is_on("sky_image"):
             out["environment"] = "pairs_sky.hdr"
+        if self.has_texture():
+            out["uses"] = [TEXTURE]
         if "lens" in CAMERA_LEVELS[self.camera] and self.is_on("lens"):
             eye, target = self.eye()
             out["lens_radius"] = float(f"{0.14 * self.size:.6g}")
             out["focal_distance"] = float(f"{1.25 * self.unit * math.dist(eye, target):.6g}")
         return out
 
+    def has_texture(self):
+        return self.floor != "plain" and self.is_on(self.floor)
+
     def all_levels(self):
         """Those that can be left out."""
         objects = self.levels["objects"]
         return sorted({m for m, _, _ in objects} - {"mosaic"}) + sorted({g for _, g, _ in objects}) + \
             sorted({t for _, _, t in objects}) + \
-            list(LIGHT_LEVELS[self.lights]) + [c for c in CAMERA_LEVELS[self.camera] if c not in ("pinhole", "odd_size")] + \
+            [f for f in [self.floor] if f != "plain"] + list(LIGHT_LEVELS[self.lights]) + [c for c in CAMERA_LEVELS[self.camera] if c not in ("pinhole", "odd_size")] + \
             ["depth"]
+
+
+TEXTURE = "pairs_texture.png"
+
+
+def write_images(folder):
+    write_sky(os.path.join(folder, "pairs_sky.hdr"))
+    write_texture(os.path.join(folder, TEXTURE))
 
 
 def write_sky(path):
@@ -465,13 +498,28 @@ def write_sky(path):
         f.write(rows_)
 
 
+def write_texture(path):
+    """5 x 4 texels of all hues, half of the light on the mean; not packed, so that each zlib writes the same bytes."""
+    raw = bytearray()
+    for y in range(4):
+        raw.append(0)
+        for x in range(5):
+            raw += bytes(130 + (37 * x * x + 71 * y + 97 * c * (x + y)) % 120 for c in range(3))
+
+    def chunk(kind, body):
+        return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+    with open(path, "wb") as f:
+        f.write(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", 5, 4, 8, 2, 0, 0, 0)) +
+                chunk(b"IDAT", zlib.compress(bytes(raw), 0)) + chunk(b"IEND", b""))
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("dir")
     parser.add_argument("--without", default=":")
     args = parser.parse_args()
     which, off = args.without.split(":")
-    write_sky(os.path.join(args.dir, "pairs_sky.hdr"))
+    write_images(args.dir)
     for row in rows():
         scene = Scene(row)
         if which and which != scene.name:

@@ -5,14 +5,15 @@ import itertools
 import json
 import os
 
-from pairs import CAMERA_LEVELS, LIGHT_LEVELS, LIGHTS, CAMERAS, DEPTHS, GEOMETRIES, MATERIALS, TRANSFORMS, WORLDS, Scene, rows
+from pairs import CAMERA_LEVELS, LIGHT_LEVELS, LIGHTS, CAMERAS, DEPTHS, FLOORS, GEOMETRIES, MATERIALS, TRANSFORMS, WORLDS, Scene, rows
 
 FACTORS = {"material": list(MATERIALS),
            "geometry": [*GEOMETRIES, "mosaic"],
            "transform": [*TRANSFORMS, *WORLDS[1:]],
            "light": [level for name in LIGHTS for level in LIGHT_LEVELS[name]],
            "camera": sorted({level for name in CAMERAS for level in CAMERA_LEVELS[name]}),
-           "depth": [f"depth {d}" for d in DEPTHS]}
+           "depth": [f"depth {d}" for d in DEPTHS],
+           "floor": list(FLOORS[1:])}
 OF_OBJECTS = ("material", "geometry", "transform")
 
 
@@ -47,7 +48,7 @@ def pairs_of(scene):
     """{(factor, level, factor, level)}"""
     objects = list(triples(scene))
     alone = {"light": LIGHT_LEVELS[scene.lights], "camera": CAMERA_LEVELS[scene.camera],
-             "depth": [f"depth {scene.depth}"]}
+             "depth": [f"depth {scene.depth}"], "floor": [scene.floor] if scene.floor != "plain" else []}
     levels = {f: {o[i] for o in objects} for i, f in enumerate(OF_OBJECTS)} | alone
     for f, g in itertools.combinations(FACTORS, 2):
         if g in OF_OBJECTS:

@@ -3,30 +3,38 @@ import math
 
 
 class Mesh:
-    """Corners, with normals or without, and groups of polygons: symbol and lists of numbers of corners."""
+    """Corners, with normals and texture coordinates or without, and groups of polygons: symbol and lists of numbers of corners."""
 
-    def __init__(self, points, groups, normals=None):
-        self.points, self.groups, self.normals = points, groups, normals
+    def __init__(self, points, groups, normals=None, uv=None):
+        self.points, self.groups, self.normals, self.uv = points, groups, normals, uv
 
     def text(self, name):
         sources = [("p", self.points)] + ([("n", self.normals)] if self.normals else [])
+        uv = f'<input semantic="TEXCOORD" source="#{name}_t" offset="0" set="0"/>' if self.uv else ""
         out = "".join(
             f'<source id="{name}_{s}"><float_array id="{name}_{s}a" count="{3 * len(v)}">' +
             " ".join(f"{x + 0.0:.4g}" for p in v for x in p) +
             f'</float_array><technique_common><accessor source="#{name}_{s}a" count="{len(v)}" stride="3">'
             '<param name="X" type="float"/><param name="Y" type="float"/><param name="Z" type="float"/>'
             "</accessor></technique_common></source>" for s, v in sources)
+        if uv:
+            out += f'<source id="{name}_t"><float_array id="{name}_ta" count="{2 * len(self.uv)}">' + \
+                " ".join(f"{x:g}" for p in self.uv for x in p) + \
+                f'</float_array><technique_common><accessor source="#{name}_ta" count="{len(self.uv)}" stride="2">' \
+                '<param name="S" type="float"/><param name="T" type="float"/></accessor></technique_common></source>'
         out += f'<vertices id="{name}_v"><input semantic="POSITION" source="#{name}_p"/>' + \
             (f'<input semantic="NORMAL" source="#{name}_n"/>' if self.normals else "") + "</vertices>"
         for symbol, polygons in self.groups:
             out += f'<polylist material="{symbol}" count="{len(polygons)}">' \
-                f'<input semantic="VERTEX" source="#{name}_v" offset="0"/>' \
+                f'<input semantic="VERTEX" source="#{name}_v" offset="0"/>{uv}' \
                 f"<vcount>{' '.join(str(len(p)) for p in polygons)}</vcount>" \
                 f"<p>{' '.join(str(i) for p in polygons for i in p)}</p></polylist>"
         return f"<mesh>{out}</mesh>"
 
 
 class Sphere:
+    uv = None
+
     def text(self, _name):
         return '<extra><technique profile="ASSAY"><sphere><radius>1</radius></sphere></technique></extra>'
 
@@ -38,10 +46,10 @@ def corners(mesh):
     return mesh.points
 
 
-def quad(corner, a, b):
+def quad(corner, a, b, uv=None):
     p = [list(corner), [c + x for c, x in zip(corner, a)], [c + x + y for c, x, y in zip(corner, a, b)],
          [c + y for c, y in zip(corner, b)]]
-    return Mesh(p, [("m", [(0, 1, 2, 3)])])
+    return Mesh(p, [("m", [(0, 1, 2, 3)])], uv=uv)
 
 
 def box():

@@ -29,6 +29,7 @@ LEVELS = """
 | point_constant, point_linear, point_quadratic, spot, sun | lights without area; the spot with all three parts of the falloff | dark |
 | lens, wide, tall | thin lens; 4 : 3; 3 : 4, by the vertical angle | a pinhole; the angle taken for that of the other side |
 | near, far_clip | a sheet before the near plane, one behind the far plane: both are met by paths that have bounced | planes that cut nothing |
+| texture_nearest, texture_bilinear | 5 x 4 texels on the floor, repeated along one axis and mirrored along the other; clamped and ending | a plain floor |
 | depth | parallel mirrors before a glowing sheet, in which as many reflections as paths may have are seen | one bounce less |
 """
 
@@ -44,24 +45,24 @@ def main():
     missing = [k for k, v in pairs.items() if not v]
     effect = {(k["scene"], k["level"]): k["effect"] for k in knocked["levels"]}
     out = ["# Pairs of features", ""]
-    out += ["Scenes 50 to 65 hold all pairs of levels of six factors: material, geometry and transform of an object, light, camera,",
-            "depth. Bugs that need two features together, which scenes of one feature each do not meet, show here. Written by",
+    out += ["Scenes 50 to 65 hold all pairs of levels of seven factors: material, geometry and transform of an object, light, camera,",
+            "depth, texture of the floor. Bugs that need two features together, which scenes of one feature each do not meet, show here. Written by",
             "`reference/pairs/pairs_page.py`; do not edit.", "",
             "    python3 reference/pairs/pairs.py reference/scenes    # the scenes again, from the table in pairs.py",
             "    make pairs                                           # each level switched off, and the runs; this page",
             "", "## The array", "",
             "Sixteen scenes are an orthogonal array: lights, world, camera and depth, four of each, in all combinations of two; a fifth",
-            "column says which four have a mosaic. Materials and geometries go round the eight objects of a scene, and so do",
+            "column says which four have a mosaic, and what texture the floor has. Materials and geometries go round the eight objects of a scene, and so do",
             "transforms in the world at the origin. A pair of two of an object's factors counts where one object has both.", "",
-            "| scene | lights | world | camera | pixels | depth | mosaic |", "|---|---|---|---|---|--:|---|"]
+            "| scene | lights | world | camera | pixels | depth | mosaic | floor |", "|---|---|---|---|---|--:|---|---|"]
     for s in scenes:
         size = s.settings()
         out.append(f"| {s.name} | {', '.join(LIGHT_LEVELS[s.lights])} | {s.world} | {', '.join(CAMERA_LEVELS[s.camera])} | "
-                   f"{size['width']} x {size['height']} | {s.depth} | {'yes' if s.mosaic else ''} |")
+                   f"{size['width']} x {size['height']} | {s.depth} | {'yes' if s.mosaic else ''} | {s.floor} |")
     out += ["", "## What each level is"] + LEVELS.rstrip().split("\n")
     out += ["", f"Truth: Cycles, {100 * MARGIN_GLOBAL:g} % of the image ({100 * MARGIN_GLOBAL_DARK:g} % where no sky shines), {100 * MARGIN_TILE:g} % of a tile. POV-Ray has no rough metals, and each scene has one.",
             "The mirrors of the depth meter reflect all light: no path ends by roulette there, so that a pixel has no noise.",
-            "Not in the array: textures (29_textures has them) and 1e6 triangles, whose dump for Cycles alone is 100 MB.",
+            "Not in the array: 1e6 triangles, whose dump for Cycles alone is 100 MB.",
             "", f"## Which scene holds which pair: {len(pairs) - len(missing)} of {len(pairs)}", ""]
     out += ["In no scene: " + "; ".join(f"{a} with {b}" for _, a, _, b in missing) + ".",
             "A sphere scaled unevenly is no sphere, and refused. Cycles cannot light its random facets, of which Beckmann's are made,",

@@ -3,7 +3,7 @@ import json
 import textwrap
 
 # Samples of ours, replicates and samples of Cycles; declared with the margins before anything was judged.
-SAMPLES = {53: 512, 54: 2048, 57: 2048, 62: 2048, 63: 2048, 64: 2048}
+SAMPLES = {53: 512, 54: 2048, 56: 2048, 57: 2048, 62: 2048, 63: 2048, 64: 2048}
 SAMPLES_ELSE, REPLICATES, REPLICATE_SAMPLES = 1024, 32, 64
 MARGIN_GLOBAL, MARGIN_GLOBAL_DARK, MARGIN_TILE, TILE = 0.01, 0.015, 0.06, 32
 
@@ -16,7 +16,8 @@ def margin_global(scene):
 
 
 def json_text(scene):
-    levels = sorted({m for m, _, _ in scene.levels["objects"]} | {g for _, g, _ in scene.levels["objects"]})
+    levels = sorted({m for m, _, _ in scene.levels["objects"]} | {g for _, g, _ in scene.levels["objects"]}) + \
+        ([scene.floor] if scene.floor != "plain" else [])
     out = {"title": f"Pairs of features: {scene.lights}, {scene.world}, {scene.camera}, depth {scene.depth}",
            "detects": "a bug of any of " + ", ".join(levels) + ", or of two together",
            "blind_to": f"errors below {100 * margin_global(scene):g} % of the image and {100 * MARGIN_TILE:g} % of a tile",
@@ -34,7 +35,7 @@ def page(scene):
     return f"""# {scene.name}: pairs of features
 
 """ + wrap(f"Made by `reference/pairs/pairs.py`; how, and what each level is, says [pairs of features](../docs/pairs.md). Eight "
-           f"objects on a floor, {WORDS[scene.world]}; depth {scene.depth}. Lights: "
+           f"objects on a floor{'' if scene.floor == 'plain' else f' with a {scene.floor}'}, {WORDS[scene.world]}; depth {scene.depth}. Lights: "
            f"{', '.join([*LIGHT_LEVELS[scene.lights], *sheet])}. Camera: {', '.join(CAMERA_LEVELS[scene.camera])}.") + f"""
 
 | material | geometry | transform |
@@ -42,7 +43,7 @@ def page(scene):
 {objects}
 
 ## What it detects
-A wrong material, shape, transform, light, camera or depth, alone or with any of the others that are here.
+A wrong material, shape, transform, texture, light, camera or depth, alone or with any of the others that are here.
 
 ## What it is blind to
 """ + wrap(f"Errors below {100 * margin_global(scene):g} % of the image and {100 * MARGIN_TILE:g} % of {TILE} x {TILE} pixels, wherever "

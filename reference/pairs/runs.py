@@ -75,7 +75,7 @@ class Runner:
         if run["adaptive"] == "rule":
             self.command += ["-a", "256", "0.01"]
         if run["adaptive"] == "unbiased":
-            self.command += ["--adaptive-unbiased", "0.01", "--pilot", "64"]
+            self.command += ["--adaptive-unbiased", "0.01", "--pilot", "256"]
 
     def trace(self, image, samples, *options):
         self.last = image
