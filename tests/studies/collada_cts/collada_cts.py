@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
 """Every COLLADA file of a copy of Khronos' conformance suite through pathtracer: what loads, with which notes, what is
-refused and why, and whether images are alike or differ where the suite's own judges say so.
+refused and why, whether images are alike or differ where the suite's own judges say so, and whether silhouettes are those
+of its reference images (oiiotool reads these), but for what stands in others.txt beside this.
 
 usage: collada_cts.py PATHTRACER DIR [--load-only]
 
-DIR holds StandardDataSets. Prints Markdown; exit code 1 if a run crashes, hangs or says other than one line."""
+DIR holds StandardDataSets. Prints Markdown; exit code 1 if a run crashes, hangs or says other than one line, or if a
+silhouette is another one than was seen before."""
 import collections
 import concurrent.futures
 import os
@@ -16,6 +18,9 @@ import tempfile
 import zlib
 
 SIZE, SAMPLES = 64, 16
+# Two silhouettes are the same if this share of what either covers is covered by both.
+ALIKE, SILHOUETTE_SIZE = 0.88, 128
+HERE = os.path.dirname(os.path.abspath(__file__))
 # An image is another one where more than this share of pixels differs by more than the suite's own 5 of 255.
 SHARE, STEP = 0.01, 5
 JUDGE = re.compile(r'CompareImagesAgainst\(context, "([^"]+)"(?:, None, None, 5, \w+(?:, (True|False))?)?\)')
@@ -110,6 +115,50 @@ def judge(results, root):
     print("\nNot so:\n\n" + "\n".join(sorted(wrong)) if wrong else "")
 
 
+def reference_image(path):
+    """The one still image that the suite has of a file, or None."""
+    found = [os.path.join(d, f) for d, _, names in os.walk(os.path.join(os.path.dirname(path), "Blessed"))
+             for f in names if f.lower().endswith(".png")]
+    return found[0] if len(found) == 1 else None
+
+
+def mask(image, channel, folder):
+    """Where the channel is above a half, in a square of SILHOUETTE_SIZE."""
+    out = os.path.join(folder, "mask.png")
+    subprocess.run(["oiiotool", image, "--ch", ",".join([channel] * 3), "--resize:filter=box",
+                    f"{SILHOUETTE_SIZE}x{SILHOUETTE_SIZE}", "-d", "uint8", "-o", out], check=True, capture_output=True)
+    return [b > 127 for b in read_png(out)[::3]]
+
+
+def silhouette(job):
+    """Share of what either image covers that both cover; None where there is nothing to compare."""
+    tracer, path, reference = job
+    with tempfile.TemporaryDirectory() as folder:
+        image, size = os.path.join(folder, "hits.exr"), str(SILHOUETTE_SIZE)
+        if run([tracer, "-q", "-t", "1", "-s", "16", "-m", "1", "-r", size, size, "--aov", "-f", image, path])[0] != 0:
+            return None
+        ours, theirs = mask(image, "depth.hits", folder), mask(reference, "A", folder)
+    either = sum(a or b for a, b in zip(ours, theirs))
+    return sum(a and b for a, b in zip(ours, theirs)) / either if either else 1.0
+
+
+def judge_silhouettes(loaded, tracer, pool, root):
+    """Are those that are not the reference image's the ones of others.txt? Those were looked at."""
+    jobs = [(tracer, r["path"], reference_image(r["path"])) for r in loaded if r["image"] is not None]
+    jobs = [j for j in jobs if j[2] is not None]
+    shares = {os.path.relpath(j[1], root): s for j, s in zip(jobs, pool.map(silhouette, jobs)) if s is not None}
+    with open(os.path.join(HERE, "others.txt"), encoding="utf-8") as f:
+        seen = dict(line.rstrip("\n").split(": ", 1)[::-1] for line in f if line.strip())
+    others = sorted(p for p, s in shares.items() if s < ALIKE)
+    new = [p for p in others if p not in seen]
+    print(f"\n## Silhouettes of the suite's reference images\n\n- compared: {len(shares)}\n- the same: {len(shares) - len(others)}"
+          f"\n- another, and looked at: {len(others) - len(new)}\n- another, not seen before: {len(new)}")
+    if others:
+        table("another because", collections.Counter(seen[p] for p in others if p in seen))
+    print("".join(f"\nNEW {p}: {shares[p]:.2f}" for p in new))
+    return bool(new)
+
+
 def main():
     tracer, root = sys.argv[1], sys.argv[2]
     load_only = "--load-only" in sys.argv
@@ -131,9 +180,11 @@ def main():
     table("loaded, but", collections.Counter(reason(r["unlit"], root) for r in loaded if "unlit" in r))
     for r in broken:
         print(f"\nBROKEN {r['path']}: {r['status']}: {r['lines'][:3]}")
-    if not load_only:
-        judge(results, root)
-    return bool(broken)
+    if load_only:
+        return bool(broken)
+    judge(results, root)
+    with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
+        return judge_silhouettes(loaded, tracer, pool, root) or bool(broken)
 
 
 if __name__ == "__main__":
