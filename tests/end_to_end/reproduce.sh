@@ -181,10 +181,11 @@ if env PATH=/nowhere "$assay" reproduce golden/12_point_plane/cycles.exr >"$tmp/
 else
     echo "ok reproduce: a reference without its engine"
 fi
-if command -v blender >/dev/null; then
+stored=$(sed -n 's/.*"version": "\(Blender [0-9.]*\)".*/\1/p' golden/12_point_plane/manifest.json | head -n 1)
+if [ "$(blender --version 2>/dev/null | head -n 1)" = "$stored" ]; then
     expect "a reference by Cycles" 0 "the same bits in all" "$tmp/golden/12_point_plane/cycles.exr"
 else
-    echo "skip reproduce: a reference by Cycles (no blender)"
+    echo "skip reproduce: a reference by Cycles (needs the $stored that made it)"
 fi
 
 # What an interrupted render says to go on with, also behind a "--".
