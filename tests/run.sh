@@ -45,7 +45,7 @@ for program in "${programs[@]}"; do
     status=127 seconds=0
     read -r status seconds <"$log/$name.status"
     # The lines carry the name twice where a test fails; only the first list is counted.
-    sed '/^\[==========\] [0-9]* test/q' "$log/$name.out" >"$log/$name.first"
+    sed '/^\[==========\].* run\.$/q' "$log/$name.out" >"$log/$name.first"
     p=$(count OK "$log/$name.first") f=$(count FAILED "$log/$name.first")
     s=$(count SKIPPED "$log/$name.first")
     if [ "$status" -ne 0 ] && [ "$f" -eq 0 ] || [ $((p + f + s)) -eq 0 ]; then
