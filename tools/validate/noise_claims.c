@@ -389,7 +389,8 @@ static bool look(const struct noise_job *job, int replicates, struct noise_rende
 }
 
 /* Renders with one sampler and judges it by its record. With a budget in two looks, at half of the replicates and at all of
- * them, each at half of alpha. */
+ * them; what is not decided then gets a last look at twice as many, since a few rare events can hide how noisy the others
+ * are. Each look has the same part of alpha. */
 static bool judge_ours(const struct noise_job *job, const json_t *stored, double alpha, int looks,
                        json_t *rows, struct err *e)
 {
@@ -402,11 +403,11 @@ static bool judge_ours(const struct noise_job *job, const json_t *stored, double
         entry != NULL || err_set(e, "no record of its noise is stored: `make golden` makes it");
     ok = ok && noise_ladder_parse(entry, job->scene, &record, e);
     bool decided = false;
-    for (int k = 1; ok && !decided && k <= looks; k++) {
+    for (int k = 1; ok && !decided && k <= looks + 1; k++) {
+        int replicates = k <= looks ? NOISE_REPLICATES * k / looks : job->replicates;
         json_decref(row);
         row = NULL;
-        ok = look(job, job->replicates * k / looks, &renders, &record, alpha / looks, &decided,
-                  &row, e);
+        ok = look(job, replicates, &renders, &record, alpha / (looks + 1), &decided, &row, e);
     }
     ok = ok && (json_array_append(rows, row) == 0 || err_set(e, "out of memory"));
     json_decref(row);
@@ -461,7 +462,7 @@ json_t *noise_claims_run(const struct validate_options *opt, const struct suite_
                             .unit = &unit,
                             .pathtracer = opt->pathtracer,
                             .dir = dir.s,
-                            .replicates = NOISE_REPLICATES,
+                            .replicates = 2 * NOISE_REPLICATES,
                             .threads = opt->threads,
                             .seed = (uint32_t)opt->seed,
                             .first = FIRST_SEED,

@@ -65,7 +65,9 @@ static bool render_one(const struct noise_job *job, int rung, int k, struct mome
         return err_set(e, "the budget is spent");
     const struct path image = fs_path("%s/noise.exr", job->dir);
     const struct path log = fs_path("%s/noise.log", job->dir);
-    int number = (job->sobol * NOISE_RUNGS + rung) * job->replicates + k;
+    /* Batches of replicates, so that more of them leave the seeds of the first as they are. */
+    int batch = k / NOISE_REPLICATES * 2 * NOISE_RUNGS + job->sobol * NOISE_RUNGS + rung;
+    int number = batch * NOISE_REPLICATES + k % NOISE_REPLICATES;
     const struct pathtracer_job ours = {.program = job->pathtracer,
                                         .scene = job->scene,
                                         .spp = noise_ladder_spp[rung],
