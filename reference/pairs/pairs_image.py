@@ -30,14 +30,6 @@ def read_png(path):
     return width, height, step, rows
 
 
-def code(radiance, is_assignments):
-    """0 to 255 by IEC 61966-2-1, or by the assignment's curve, exposure 1 and gamma 2.2."""
-    x = min(max(radiance, 0), 1)
-    if is_assignments:
-        return 255 * min(1, x ** (1 / 2.2))
-    return 255 * (12.92 * x if x <= 0.0031308 else 1.055 * x ** (1 / 2.4) - 0.055)
-
-
 def unzip(data, size):
     """Of OpenEXR's ZIP: differences, and even bytes before odd ones."""
     if len(data) == size:

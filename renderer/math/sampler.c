@@ -27,7 +27,7 @@ struct sample4 sampler_draw(const struct sampler *s, uint32_t pixel, uint32_t sa
     struct sobol_keys block = {0};
     struct sample4 out;
     if (s->kind == SAMPLER_SOBOL)
-        block = sobol_keys(&keys, vertex, purpose);
+        block = sobol_keys(s->seed, vertex, purpose);
     drawv(s->kind, &keys, &block, pixel, sample, vertex, purpose, 4, out.u);
     return out;
 }

@@ -108,16 +108,14 @@ struct sobol_keys {
     uint32_t order, scramble[4];
 };
 
-static inline struct sobol_keys sobol_keys(const struct philox_keys *keys, uint32_t vertex,
-                                           uint32_t purpose)
+static inline struct sobol_keys sobol_keys(uint64_t seed, uint32_t vertex, uint32_t purpose)
 {
+    const uint32_t key[2] = {(uint32_t)seed, (uint32_t)(seed >> 32)};
+    uint32_t order[4];
     struct sobol_keys k;
-    vu out[2][4];
-    for (uint32_t i = 0; i < 2; i++)
-        philoxv(vu_set(0), vu_set(i), vertex, purpose, keys, PHILOX_ROUNDS, out[i]);
-    k.order = (uint32_t)LANE(out[0][0], 0);
-    for (int i = 0; i < 4; i++)
-        k.scramble[i] = (uint32_t)LANE(out[1][i], 0);
+    philox4x32((const uint32_t[]){0, 0, vertex, purpose}, key, PHILOX_ROUNDS, order);
+    philox4x32((const uint32_t[]){0, 1, vertex, purpose}, key, PHILOX_ROUNDS, k.scramble);
+    k.order = order[0];
     return k;
 }
 

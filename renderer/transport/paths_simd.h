@@ -36,19 +36,20 @@ struct draws {
     int used; /* numbers, at least 2 */
 };
 
-INLINE void draw_rows(struct batch *b, enum sampler_kind kind, const struct philox_keys *keys,
-                      int first, int end, const struct draws *what, int used)
+INLINE void draw_rows(struct batch *b, enum sampler_kind kind, uint64_t seed, int first, int end,
+                      const struct draws *what, int used)
 {
+    const struct philox_keys keys = philox_keys(seed);
     for (int i = 0; i < what->num; i++) {
         const uint32_t vertex = (uint32_t)what->vertex, purpose = what->purpose + (uint32_t)i;
         struct sobol_keys block = {0};
         if (kind == SAMPLER_SOBOL)
-            block = sobol_keys(keys, vertex, purpose);
+            block = sobol_keys(seed, vertex, purpose);
         for (int k = first, row = i; k < end; k += LANES, row += what->num) {
             vu pixel = (vu)vi_load_any(b->slot_pixel + k);
             vu sample = (vu)vi_load_any(b->slot_sample + k);
             vf u[4];
-            drawv(kind, keys, &block, pixel, sample, vertex, purpose, used, u);
+            drawv(kind, &keys, &block, pixel, sample, vertex, purpose, used, u);
             for (int d = 0; d < used; d++)
                 vf_store_any(b->numbers[d] + LANES * row, u[d]);
         }
@@ -60,15 +61,15 @@ INLINE void draw_rows(struct batch *b, enum sampler_kind kind, const struct phil
 static __attribute__((noinline)) void draw_numbers(const struct integrator *it, struct batch *b,
                                                    int first, int end, struct draws what)
 {
-    const struct philox_keys keys = philox_keys(it->opt.sampler.seed);
+    const uint64_t seed = it->opt.sampler.seed;
     if (it->opt.sampler.kind == SAMPLER_INDEPENDENT)
-        draw_rows(b, SAMPLER_INDEPENDENT, &keys, first, end, &what, 4);
+        draw_rows(b, SAMPLER_INDEPENDENT, seed, first, end, &what, 4);
     else if (what.used == 2)
-        draw_rows(b, SAMPLER_SOBOL, &keys, first, end, &what, 2);
+        draw_rows(b, SAMPLER_SOBOL, seed, first, end, &what, 2);
     else if (what.used == 3)
-        draw_rows(b, SAMPLER_SOBOL, &keys, first, end, &what, 3);
+        draw_rows(b, SAMPLER_SOBOL, seed, first, end, &what, 3);
     else
-        draw_rows(b, SAMPLER_SOBOL, &keys, first, end, &what, 4);
+        draw_rows(b, SAMPLER_SOBOL, seed, first, end, &what, 4);
 }
 
 INLINE void load_numbers(const struct batch *b, int row, vf u[4])

@@ -11,16 +11,17 @@ import collections
 import concurrent.futures
 import os
 import re
-import struct
 import subprocess
 import sys
 import tempfile
-import zlib
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+sys.path.insert(0, os.path.join(HERE, "../../../reference/pairs"))
+from pairs_image import read_png  # noqa: E402
 
 SIZE, SAMPLES = 64, 16
 # Two silhouettes are the same if this share of what either covers is covered by both.
 ALIKE, SILHOUETTE_SIZE = 0.88, 128
-HERE = os.path.dirname(os.path.abspath(__file__))
 # An image is another one where more than this share of pixels differs by more than the suite's own 5 of 255.
 SHARE, STEP = 0.01, 5
 JUDGE = re.compile(r'CompareImagesAgainst\(context, "([^"]+)"(?:, None, None, 5, \w+(?:, (True|False))?)?\)')
@@ -34,29 +35,9 @@ def run(command):
         return -1, "no end within 120 s"
 
 
-def read_png(path):
-    """The bytes of an 8 bit RGB image, rows unfiltered."""
-    data, at, body, width = open(path, "rb").read(), 8, b"", 0
-    while at < len(data):
-        length, kind = struct.unpack(">I4s", data[at:at + 8])
-        chunk = data[at + 8:at + 8 + length]
-        if kind == b"IHDR":
-            width, height, depth, colour = struct.unpack(">IIBB", chunk[:10])
-            assert (depth, colour) == (8, 2)
-        body += chunk if kind == b"IDAT" else b""
-        at += 12 + length
-    raw, rows, above = zlib.decompress(body), [], bytes(3 * width)
-    for y in range(height):
-        start = y * (3 * width + 1)
-        kind, row = raw[start], bytearray(raw[start + 1:start + 1 + 3 * width])
-        for x in range(3 * width):
-            a, b, c = (row[x - 3] if x > 2 else 0), above[x], (above[x - 3] if x > 2 else 0)
-            p = a + b - c
-            paeth = min((abs(p - v), i) for i, v in enumerate((a, b, c)))[1]
-            row[x] = row[x] + (0, a, b, (a + b) // 2, (a, b, c)[paeth])[kind] & 255
-        rows.append(bytes(row))
-        above = row
-    return b"".join(rows)
+def pixels(path):
+    """The bytes of an 8 bit RGB image."""
+    return b"".join(read_png(path)[3])
 
 
 def try_file(job):
@@ -69,7 +50,7 @@ def try_file(job):
         lines = text.splitlines()
         result["notes"] = [s.split("note: ", 1)[1] for s in lines if s.startswith("pathtracer: note: ")]
         if status == 0:
-            result["image"] = read_png(image)
+            result["image"] = pixels(image)
         else:
             result["status"], result["unlit"] = (0, lines[-1]) if status == 3 else (status, None)
     return result
@@ -127,7 +108,7 @@ def mask(image, channel, folder):
     out = os.path.join(folder, "mask.png")
     subprocess.run(["oiiotool", image, "--ch", ",".join([channel] * 3), "--resize:filter=box",
                     f"{SILHOUETTE_SIZE}x{SILHOUETTE_SIZE}", "-d", "uint8", "-o", out], check=True, capture_output=True)
-    return [b > 127 for b in read_png(out)[::3]]
+    return [b > 127 for b in pixels(out)[::3]]
 
 
 def silhouette(job):
