@@ -74,33 +74,31 @@ static bool is_sphere(const struct build *b, uint32_t item)
     return b->item[item].prim >= b->scene->num_triangles;
 }
 
-static int by_number(const void *a, const void *b)
-{
-    uint32_t x = ((const struct wide_item *)a)->prim, y = ((const struct wide_item *)b)->prim;
-    return (x > y) - (x < y);
-}
-
-static void fill_leaf(const struct build *b, struct wide_item *item, uint32_t count,
+static void fill_leaf(const struct build *b, const struct wide_item *item, uint32_t count,
                       struct wide_leaf *l)
 {
     const struct scene *s = b->scene;
-    qsort(item, count, sizeof *item, by_number);
     for (int c = 0; c < 3; c++)
         for (int a = 0; a < 3; a++)
             for (int i = 0; i < WIDTH; i++)
                 l->p[c][a][i] = NAN;
     for (uint32_t i = 0; i < WIDTH; i++)
-        l->prim[i] = i < count ? item[i].prim : NO_HIT;
-    for (uint32_t i = 0; i < count; i++) {
-        if (item[i].prim >= s->num_triangles) {
-            const struct sphere *sp = &s->spheres[item[i].prim - s->num_triangles];
+        l->prim[i] = NO_HIT;
+    for (uint32_t k = 0; k < count; k++) {
+        const uint32_t prim = item[k].prim;
+        uint32_t i = 0;
+        for (uint32_t j = 0; j < count; j++)
+            i += item[j].prim < prim;
+        l->prim[i] = prim;
+        if (prim >= s->num_triangles) {
+            const struct sphere *sp = &s->spheres[prim - s->num_triangles];
             l->p[0][0][i] = sp->centre.x;
             l->p[0][1][i] = sp->centre.y;
             l->p[0][2][i] = sp->centre.z;
             l->p[1][0][i] = sp->radius;
             continue;
         }
-        const vec3 *p = s->position + 3 * (size_t)item[i].prim;
+        const vec3 *p = s->position + 3 * (size_t)prim;
         for (int c = 0; c < 3; c++) {
             l->p[c][0][i] = p[c].x;
             l->p[c][1][i] = p[c].y;

@@ -93,26 +93,29 @@ static void split(const struct wide_item *item, uint32_t n, const struct wide_bo
     }
 }
 
+/* Without a branch: to which side an item goes cannot be predicted. Those of the left side trade places with
+ * the first of the right side. */
 static uint32_t partition(struct wide_item *item, uint32_t n, const struct wide_split *s,
                           struct wide_box *left, struct wide_box *right)
 {
     vf cl = vf_set(FLT_MAX), cr = cl;
-    uint32_t i = 0, j = n;
-    while (i < j) {
+    const vf none = cl;
+    const int axis = s->axis;
+    uint32_t num_left = 0;
+    for (uint32_t i = 0; i < n; i++) {
         vf x = item_box(item + i), c = x - swap_halves(x);
-        if ((int)((c[s->axis] - s->low) * s->to_bins) < s->bin) {
-            cl = vf_min(c, cl);
-            i++;
-        } else {
-            cr = vf_min(c, cr);
-            struct wide_item swap = item[--j];
-            item[j] = item[i];
-            item[i] = swap;
-        }
+        float at = item[i].min[axis] - item[i].minus_max[axis];
+        int32_t goes_left = (int)((at - s->low) * s->to_bins) < s->bin;
+        vi mask = vi_set(-goes_left);
+        cl = vf_min(vf_select(mask, c, none), cl);
+        cr = vf_min(vf_select(mask, none, c), cr);
+        vf_store(item[i].min, item_box(item + num_left));
+        vf_store(item[num_left].min, x);
+        num_left += (uint32_t)goes_left;
     }
     vf_store(left->v, cl);
     vf_store(right->v, cr);
-    return i;
+    return num_left;
 }
 
 const struct sah_split_passes FOR_ISA(sah_split) = {
