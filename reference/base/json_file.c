@@ -21,6 +21,17 @@ json_t *json_read(const char *path, size_t flags, json_error_t *why)
     return root;
 }
 
+json_t *json_read_or_say(const char *path, struct err *e)
+{
+    json_error_t why;
+    json_t *root = json_read(path, JSON_REJECT_DUPLICATES, &why);
+    if (root == NULL && why.line > 0)
+        err_set(e, "%s:%d: %s", path, why.line, why.text);
+    else if (root == NULL)
+        err_set(e, "%s: %s", path, why.text);
+    return root;
+}
+
 bool json_write_as(const char *path, const json_t *root, size_t flags, struct err *e)
 {
     struct out_file out;

@@ -9,6 +9,9 @@
 /* json_load_file() of a regular file; what else there is, as a FIFO, for which it would wait, cannot be opened. */
 json_t *json_read(const char *path, size_t flags, json_error_t *why);
 
+/* The same without duplicates among members; NULL with a line, "FILE:LINE: why", or "FILE: why" where it cannot be opened. */
+json_t *json_read_or_say(const char *path, struct err *e);
+
 /* Writes by rename, indented, with a final newline; makes the directories above it. */
 bool json_write(const char *path, const json_t *root, struct err *e)
     __attribute__((warn_unused_result));

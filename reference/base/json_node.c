@@ -1,5 +1,6 @@
 #include "json_node.h"
 
+#include <math.h>
 #include <string.h>
 
 bool json_only_keys(const struct json_node *n, const char *const *allowed, struct err *e)
@@ -81,6 +82,16 @@ bool json_get_text(const struct json_node *n, const char *key, char *out, size_t
             return err_set(e, "%s: '%s%s' is not one line", n->file, n->at, key);
     memcpy(out, s, strlen(s) + 1);
     return true;
+}
+
+json_t *json_finite(double v)
+{
+    return isfinite(v) ? json_real(v) : json_null();
+}
+
+json_t *json_interval(double lo, double hi)
+{
+    return isfinite(lo) && isfinite(hi) ? json_pack("[f,f]", lo, hi) : json_null();
 }
 
 const char *member_text(const json_t *object, const char *name)

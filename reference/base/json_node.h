@@ -34,6 +34,10 @@ bool json_get_number(const struct json_node *n, const char *key, double lo, doub
 bool json_get_text(const struct json_node *n, const char *key, char *out, size_t size,
                    struct err *e) __attribute__((warn_unused_result));
 
+/* A number, and an interval as [lo, hi], or null where one of them is not finite. */
+json_t *json_finite(double v);
+json_t *json_interval(double lo, double hi);
+
 /* A member of an object of which all is known: NULL, "" and 0 where it is absent. */
 const char *member_text(const json_t *object, const char *name);
 const char *member_or_empty(const json_t *object, const char *name);

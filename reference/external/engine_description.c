@@ -283,19 +283,14 @@ bool engine_load(const char *path, struct engine *out, struct err *e)
 {
     struct engine en = {.spp = 64, .replicates = 16, .scale = 1};
     char full[PATH_MAX];
-    json_error_t why;
     if (realpath(path, full) == NULL)
         return err_set(e, "%s: cannot read: %s", path, strerror(errno));
     if (strlen(full) >= sizeof en.file)
         return err_set(e, "%.64s...: path too long", path);
     strcpy(en.file, full);
     strcpy(en.here, dirname(full));
-    en.json = json_read(path, JSON_REJECT_DUPLICATES, &why);
-    if (en.json == NULL && why.line < 1)
-        return err_set(e, "%s: %s", path, why.text);
-    if (en.json == NULL)
-        return err_set(e, "%s:%d: %s", path, why.line, why.text);
-    if (!read_engine(path, &en, e)) {
+    en.json = json_read_or_say(path, e);
+    if (en.json == NULL || !read_engine(path, &en, e)) {
         engine_free(&en);
         return false;
     }
@@ -310,7 +305,7 @@ void engine_free(struct engine *en)
 }
 
 /* Appends the argument with its placeholders replaced; what does not fit is only counted. */
-static size_t fill_in(const char *text, const char *const *values, char *out, size_t room,
+static size_t fill_in(const char *text, const struct engine_value *values, char *out, size_t room,
                       const char **missing)
 {
     size_t n = 0;
@@ -320,13 +315,13 @@ static size_t fill_in(const char *text, const char *const *values, char *out, si
         if (*c == '{' || *c == '}') {
             step = brace_length(c);
             if (step > 2) {
-                const char *const *v = values;
-                while (*v != NULL &&
-                       (strlen(v[0]) != step - 2 || memcmp(v[0], c + 1, step - 2) != 0))
-                    v += 2;
-                if (*v == NULL)
+                const struct engine_value *v = values;
+                while (v->name != NULL &&
+                       (strlen(v->name) != step - 2 || memcmp(v->name, c + 1, step - 2) != 0))
+                    v++;
+                if (v->name == NULL)
                     *missing = c;
-                piece = *v != NULL ? v[1] : "";
+                piece = v->name != NULL ? v->value : "";
                 length = strlen(piece);
             }
         }
@@ -340,28 +335,32 @@ static size_t fill_in(const char *text, const char *const *values, char *out, si
     return n + 1;
 }
 
-bool engine_argv(const struct engine *en, const char *key, const char *const *values, char ***argv,
-                 struct err *e)
+bool engine_argv(const struct engine *en, const char *const *keys,
+                 const struct engine_value *values, char ***argv, struct err *e)
 {
-    const json_t *array = json_object_get(en->json, key);
-    size_t num = json_array_size(array), bytes = 0;
+    size_t num = 0, bytes = 0, i;
     const char *missing = NULL;
-    for (size_t i = 0; i < num; i++)
-        bytes += fill_in(json_string_value(json_array_get(array, i)), values, NULL, 0, &missing);
-    if (missing != NULL)
-        return err_set(e, "%s: '%s': no value for '%.*s'", en->file, key,
-                       (int)strcspn(missing, "}") + 1, missing);
+    const json_t *arg;
+    for (const char *const *key = keys; *key != NULL; key++) {
+        json_array_foreach(json_object_get(en->json, *key), i, arg) bytes +=
+            fill_in(json_string_value(arg), values, NULL, 0, &missing);
+        num += json_array_size(json_object_get(en->json, *key));
+        if (missing != NULL)
+            return err_set(e, "%s: '%s': no value for '%.*s'", en->file, *key,
+                           (int)strcspn(missing, "}") + 1, missing);
+    }
     *argv = malloc((num + 1) * sizeof **argv + bytes);
     if (*argv == NULL)
         return err_set(e, "%s: out of memory", en->file);
-    char *at = (char *)(*argv + num + 1);
-    for (size_t i = 0; i < num; i++) {
-        (*argv)[i] = at;
-        size_t n =
-            fill_in(json_string_value(json_array_get(array, i)), values, at, bytes, &missing);
-        at += n;
-        bytes -= n;
-    }
-    (*argv)[num] = NULL;
+    char *at = (char *)(*argv + num + 1), **next = *argv;
+    for (; *keys != NULL; keys++)
+        json_array_foreach(json_object_get(en->json, *keys), i, arg)
+        {
+            size_t n = fill_in(json_string_value(arg), values, at, bytes, &missing);
+            *next++ = at;
+            at += n;
+            bytes -= n;
+        }
+    *next = NULL;
     return true;
 }

@@ -47,11 +47,16 @@ bool engine_load(const char *path, struct engine *out, struct err *e)
     __attribute__((warn_unused_result));
 void engine_free(struct engine *en);
 
-/* argv of a key ("command", "version", ...), placeholders filled in from `values`: pairs of name and
- * value that end with NULL. A placeholder without a value fails. *argv is one block of memory that the
- * caller frees, NULL-terminated; absent keys give an empty argv. */
-bool engine_argv(const struct engine *en, const char *key, const char *const *values, char ***argv,
-                 struct err *e) __attribute__((warn_unused_result));
+/* What stands for a placeholder. */
+struct engine_value {
+    const char *name, *value;
+};
+/* argv of some keys ("command", "version", ...; NULL at the end) one behind the other, placeholders filled in from `values`, which
+ * end with a NULL name. A placeholder without a value fails. *argv is one block of memory that the
+ * caller frees, NULL-terminated; absent keys add nothing. */
+bool engine_argv(const struct engine *en, const char *const *keys,
+                 const struct engine_value *values, char ***argv, struct err *e)
+    __attribute__((warn_unused_result));
 
 /* True if the engine can render the scene: it has all features, and the scene can be written in its
  * format. Else `why` is one line. Tries it in a directory below dir, which exists. */

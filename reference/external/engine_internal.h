@@ -12,8 +12,9 @@ struct engine_job {
     const struct suite_scene *suite;
     const struct engine_options *opt;
     const char *dir; /* absolute */
-    char scene[3][PATH_SIZE], program[4096]; /* scene: of each channel; of channels together the first */
-    int channel;                             /* which of them is rendered */
+    char scene[3][PATH_SIZE],
+        program[4096]; /* scene: of each channel; of channels together the first */
+    int channel;       /* which of them is rendered */
     int spp, replicates;
     bool half; /* some image had fewer than 32 bits */
     double cpu_s;
@@ -22,7 +23,8 @@ struct engine_job {
 
 /* Checks that the engine can, and writes the scene to paths[0], or in grey one for each channel; for a .dae only fills paths[0]. */
 bool engine_write_scene(const struct engine *en, const struct suite_scene *suite, const char *dir,
-                        char paths[3][PATH_SIZE], struct err *e) __attribute__((warn_unused_result));
+                        char paths[3][PATH_SIZE], struct err *e)
+    __attribute__((warn_unused_result));
 
 /* Full path of the program of a key ("command", "version"). A name with a slash is relative to the
  * description, not to where we run. */

@@ -29,11 +29,19 @@ static bool find_program(const struct engine *en, const char *argv0, char *path,
 bool engine_program(const struct engine *en, const char *key, char *path, size_t size,
                     struct err *e)
 {
-    const char *const values[] = {"here",   en->here, "scene",   "",      "out",  "",      "spp",
-                                  "",       "seed",   "",        "depth", "",     "width", "",
-                                  "height", "",       "threads", "",      "name", "",      NULL};
+    const struct engine_value values[] = {{"here", en->here},
+                                          {"scene", ""},
+                                          {"out", ""},
+                                          {"spp", ""},
+                                          {"seed", ""},
+                                          {"depth", ""},
+                                          {"width", ""},
+                                          {"height", ""},
+                                          {"threads", ""},
+                                          {"name", ""},
+                                          {0}};
     char **argv;
-    if (!engine_argv(en, key, values, &argv, e))
+    if (!engine_argv(en, (const char *const[]){key, NULL}, values, &argv, e))
         return false;
     bool ok = find_program(en, argv[0], path, size, e);
     free(argv);
@@ -44,14 +52,14 @@ bool engine_program(const struct engine *en, const char *key, char *path, size_t
 static bool read_version(const struct engine_job *j, char line[256], struct err *e)
 {
     char program[4096];
-    const char *const values[] = {"here", j->en->here, NULL};
+    const struct engine_value values[] = {{"here", j->en->here}, {0}};
     char **argv = NULL;
     strcpy(line, "unknown");
     if (json_object_get(j->en->json, "version") == NULL)
         return true;
     const struct path log = fs_path("%s/version.log", j->dir);
     bool ok = engine_program(j->en, "version", program, sizeof program, e) &&
-              engine_argv(j->en, "version", values, &argv, e);
+              engine_argv(j->en, (const char *const[]){"version", NULL}, values, &argv, e);
     if (ok) {
         argv[0] = program;
         ok = process_run(&(struct process){.argv = (const char *const *)argv,

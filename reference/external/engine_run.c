@@ -22,9 +22,9 @@
 
 enum { NUMBER = 32 };
 
-/* The command of one process; *argv is one block for each of three, argv itself another. */
-static bool command_line(const struct engine_job *j, uint32_t seed, const char *out,
-                         char **block[3], const char ***argv, struct err *e)
+/* The command of one process, to free(). */
+static bool command_line(struct engine_job *j, uint32_t seed, const char *out, char ***argv,
+                         struct err *e)
 {
     char number[8][NUMBER];
     snprintf(number[0], NUMBER, "%d", j->spp);
@@ -38,69 +38,40 @@ static bool command_line(const struct engine_job *j, uint32_t seed, const char *
     char environment[4096] = "";
     if (j->suite->environment[0] != '\0' && realpath(j->suite->environment, environment) == NULL)
         return err_set(e, "%s: %s", j->suite->environment, strerror(errno));
-    const char *const values[] = {"spp",
-                                  number[0],
-                                  "seed",
-                                  number[1],
-                                  "depth",
-                                  number[2],
-                                  "name",
-                                  j->suite->name,
-                                  "width",
-                                  number[3],
-                                  "height",
-                                  number[4],
-                                  "threads",
-                                  number[5],
-                                  "scene",
-                                  j->scene[j->channel],
-                                  "out",
-                                  out,
-                                  "here",
-                                  j->en->here,
-                                  "lens_radius",
-                                  number[6],
-                                  "focal_distance",
-                                  number[7],
-                                  "environment",
-                                  environment,
-                                  NULL};
-    const char *const key[3] = {"command", j->suite->lens_radius > 0 ? "lens_args" : "",
-                                environment[0] != '\0' ? "environment_args" : ""};
-    size_t num = 0, k = 0;
-    for (int i = 0; i < 3; i++) {
-        if (!engine_argv(j->en, key[i], values, &block[i], e))
-            return false;
-        while (block[i][k] != NULL)
-            k++;
-        num += k;
-        k = 0;
-    }
-    *argv = malloc((num + 1) * sizeof **argv);
-    if (*argv == NULL)
-        return err_set(e, "%s: out of memory", j->en->name);
-    for (int i = 0; i < 3; i++)
-        for (char **arg = block[i]; *arg != NULL; arg++)
-            (*argv)[k++] = *arg;
-    (*argv)[num] = NULL;
+    const struct engine_value values[] = {{"spp", number[0]},
+                                          {"seed", number[1]},
+                                          {"depth", number[2]},
+                                          {"name", j->suite->name},
+                                          {"width", number[3]},
+                                          {"height", number[4]},
+                                          {"threads", number[5]},
+                                          {"scene", j->scene[j->channel]},
+                                          {"out", out},
+                                          {"here", j->en->here},
+                                          {"lens_radius", number[6]},
+                                          {"focal_distance", number[7]},
+                                          {"environment", environment},
+                                          {0}};
+    const char *const keys[] = {"command", j->suite->lens_radius > 0 ? "lens_args" : "",
+                                environment[0] != '\0' ? "environment_args" : "", NULL};
+    if (!engine_argv(j->en, keys, values, argv, e))
+        return false;
     (*argv)[0] = j->program;
     return true;
 }
 
 static bool run_process(struct engine_job *j, uint32_t seed, const char *out, struct err *e)
 {
-    char **block[3] = {NULL, NULL, NULL};
-    const char **argv = NULL;
+    char **argv = NULL;
     struct process_usage usage = {0};
     const struct path log = fs_path("%s/engine.log", j->dir);
-    bool ok = command_line(j, seed, out, block, &argv, e) &&
-              process_run(
-                  &(struct process){
-                      .argv = argv, .cwd = j->dir, .log = log.s, .timeout_s = j->opt->timeout_s},
-                  &usage, e);
+    bool ok = command_line(j, seed, out, &argv, e) &&
+              process_run(&(struct process){.argv = (const char *const *)argv,
+                                            .cwd = j->dir,
+                                            .log = log.s,
+                                            .timeout_s = j->opt->timeout_s},
+                          &usage, e);
     j->cpu_s += usage.cpu_s;
-    for (int i = 0; i < 3; i++)
-        free(block[i]);
     free(argv);
     return ok;
 }

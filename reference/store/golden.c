@@ -28,13 +28,10 @@ static struct place find_place(const char *golden_dir, const char *scene, const 
 /* The manifest's object; an empty one if there is no file. */
 static json_t *load_manifest(const char *path, struct err *e)
 {
-    json_error_t je;
     if (access(path, F_OK) != 0)
         return json_object();
-    json_t *all = json_read(path, JSON_REJECT_DUPLICATES, &je);
-    if (all == NULL) {
-        err_set(e, "%s:%d: %s", path, je.line, je.text);
-    } else if (!json_is_object(all)) {
+    json_t *all = json_read_or_say(path, e);
+    if (all != NULL && !json_is_object(all)) {
         err_set(e, "%s: not a JSON object", path);
         json_decref(all);
         all = NULL;
@@ -328,11 +325,8 @@ bool golden_read(const char *golden_dir, const struct suite_scene *scene,
 static bool is_wanted(const struct suite *suite, const char *scene, const char *engine)
 {
     const struct suite_scene *s = suite_find(suite, scene);
-    for (int i = 0; s != NULL && strcmp(s->references_of, s->name) == 0 && i < s->num_references;
-         i++)
-        if (strcmp(s->reference[i].engine, engine) == 0)
-            return true;
-    return false;
+    return s != NULL && strcmp(s->references_of, s->name) == 0 &&
+           suite_reference_of(s, engine) != NULL;
 }
 
 /* What one scene's directory holds, by manifest and by image. */
@@ -372,26 +366,19 @@ static bool add_orphans(const char *golden_dir, const struct suite *suite, const
 bool golden_orphans(const char *golden_dir, const struct suite *suite, json_t **names,
                     struct err *e)
 {
-    *names = json_object();
     DIR *d = opendir(golden_dir);
-    if (d == NULL && errno != ENOENT) {
-        err_set(e, "%s: %s", golden_dir, strerror(errno));
-        json_decref(*names);
-        *names = NULL;
-        return false;
-    }
-    if (d == NULL)
-        return true;
-    bool ok = *names != NULL || err_set(e, "out of memory");
+    if (d == NULL && errno != ENOENT)
+        return err_set(e, "%s: %s", golden_dir, strerror(errno));
+    json_t *found = json_object();
+    bool ok = true;
     struct dirent *entry;
-    while (ok && (entry = readdir(d)) != NULL)
+    while (ok && d != NULL && (entry = readdir(d)) != NULL)
         /* The catalogue of bugs (tools/diagnose/catalogue.h) has a manifest of its own kind. */
         if (entry->d_name[0] != '.' && strcmp(entry->d_name, "diagnose") != 0)
-            ok = add_orphans(golden_dir, suite, entry->d_name, *names, e);
-    closedir(d);
-    if (!ok) {
-        json_decref(*names);
-        *names = NULL;
-    }
+            ok = add_orphans(golden_dir, suite, entry->d_name, found, e);
+    if (d != NULL)
+        closedir(d);
+    *names = ok ? json_incref(found) : NULL;
+    json_decref(found);
     return ok;
 }

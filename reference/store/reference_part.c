@@ -126,12 +126,9 @@ static bool add_part(struct gathered *g, const json_t *identity, const char *dir
                      struct err *e)
 {
     char path[REPLICATE_IMAGE_PATH];
-    json_error_t je;
-    if (!part_path(dir, path, e))
-        return false;
-    json_t *part = json_read(path, JSON_REJECT_DUPLICATES, &je);
+    json_t *part = part_path(dir, path, e) ? json_read_or_say(path, e) : NULL;
     if (part == NULL)
-        return err_set(e, "%s:%d: %s", path, je.line, je.text);
+        return false;
     const json_t *first = json_object_get(part, "first"), *last = json_object_get(part, "last");
     json_t *said = json_object_get(part, "said");
     bool ok = json_equal(json_object_get(part, "of"), identity) ||

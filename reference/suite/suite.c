@@ -142,13 +142,8 @@ static bool load_scene(const char *dir, const char *name, struct suite_scene *s,
     if (length < 0 || (size_t)length >= sizeof file)
         return err_set(e, "%s: path too long", name);
     snprintf(s->dae, sizeof s->dae, "%s/%s.dae", dir, name);
-    json_error_t why;
-    s->json = json_read(file, JSON_REJECT_DUPLICATES, &why);
-    if (s->json == NULL && why.line < 1)
-        return err_set(e, "%s: %s", file, why.text);
-    if (s->json == NULL)
-        return err_set(e, "%s:%d: %s", file, why.line, why.text);
-    return suite_json_read(file, s, e) && hash_scene(dir, s, e);
+    s->json = json_read_or_say(file, e);
+    return s->json != NULL && suite_json_read(file, s, e) && hash_scene(dir, s, e);
 }
 
 static bool inherits(const struct suite *suite, const struct suite_scene *s)

@@ -51,7 +51,8 @@ struct suite_scene {
     char environment[4096]; /* path of an .exr or .hdr; empty if there is none */
     double lens_radius, focal_distance; /* as of struct camera; 0 and 0: pinhole */
     struct pixel_filter filter;         /* the box of one pixel, but where an engine has its own */
-    char sha256[65]; /* lower-case hex: of the .dae; with an environment, a lens or other files, of a text that
+    char sha256
+        [65]; /* lower-case hex: of the .dae; with an environment, a lens or other files, of a text that
                         holds that, the environment's, the lens and the files that it uses */
     char title[128], detects[512], blind_to[512];
     char convention[512]; /* where correct renderers may differ; empty: nowhere */

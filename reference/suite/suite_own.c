@@ -284,14 +284,12 @@ bool suite_own_read(const char *dir, struct suite *out, struct err *e)
                                        "scenes",        "comment",     NULL};
     char file[4096], comment[4096];
     int version = 1;
-    json_error_t why;
     int length = snprintf(file, sizeof file, "%s/suite.json", dir);
     if (length < 0 || (size_t)length >= sizeof file)
         return err_set(e, "%.64s...: path too long", dir);
-    json_t *root = json_read(file, JSON_REJECT_DUPLICATES, &why), *scenes;
+    json_t *root = json_read_or_say(file, e), *scenes;
     if (root == NULL)
-        return why.line < 1 ? err_set(e, "%s: %s", file, why.text)
-                            : err_set(e, "%s:%d: %s", file, why.line, why.text);
+        return false;
     const struct json_node n = {file, "", root};
     bool ok = json_is_object(root) || err_set(e, "%s: not an object", file);
     ok = ok && json_only_keys(&n, keys, e) && read_int(&n, "version", 1, 1, &version, e) &&

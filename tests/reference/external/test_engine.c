@@ -247,17 +247,18 @@ TEST(placeholders_are_filled_in)
     must_load("{\"name\": \"x\", \"format\": \"pbrt\", \"output\": \"mean\", \"expresses\": [],"
               "\"command\": [\"run\", \"\", \"{{{seed}}}\", \"{out}{out}\", \"a b;$(c) {scene}\"]}",
               &en);
-    const char *const values[] = {"scene", "s", "out", "/o", "seed", "12", NULL};
-    MUST(engine_argv(&en, "command", values, &argv, &e));
+    const struct engine_value values[] = {{"scene", "s"}, {"out", "/o"}, {"seed", "12"}, {0}};
+    const char *const command[] = {"command", NULL}, *const absent[] = {"version", NULL};
+    MUST(engine_argv(&en, command, values, &argv, &e));
     const char *const want[] = {"run", "", "{12}", "/o/o", "a b;$(c) s"};
     for (int i = 0; i < 5; i++)
         assert_string_equal(argv[i], want[i]);
     assert_null(argv[5]);
     free(argv);
-    assert_true(engine_argv(&en, "version", values, &argv, &e));
+    assert_true(engine_argv(&en, absent, values, &argv, &e));
     assert_null(argv[0]);
     free(argv);
-    REFUSES(engine_argv(&en, "command", values + 2, &argv, &e), "no value for '{scene}'");
+    REFUSES(engine_argv(&en, command, values + 1, &argv, &e), "no value for '{scene}'");
     engine_free(&en);
 }
 
