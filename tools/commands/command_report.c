@@ -4,7 +4,6 @@
 #include "tools/results/noise_results.h"
 #include "tools/results/stated_error_results.h"
 #include "tools/results/convergence_results.h"
-#include "tools/results/convergence_matrix.h"
 #include "tools/results/history.h"
 #include "tools/results/plain_words.h"
 #include "tools/report/report.h"
@@ -44,11 +43,8 @@ static const struct cli_option options[] = {
      .usage = "usage: assay report [options] RESULTS.json\n"},
     {.args = "one results file", TO(results)}};
 
-static bool print_markdown(FILE *f, const char *path, bool headline, struct err *e)
+static void print_markdown(FILE *f, const json_t *results, bool headline)
 {
-    json_t *results;
-    if (!results_read(path, &results, e))
-        return false;
     bool has_claims = json_array_size(json_object_get(results, "claims")) > 0;
     const json_t *convergence = json_object_get(results, "convergence");
     if (headline) {
@@ -64,57 +60,18 @@ static bool print_markdown(FILE *f, const char *path, bool headline, struct err 
         putc('\n', f);
     if (convergence != NULL)
         convergence_results_print_markdown(f, convergence);
-    json_decref(results);
-    return true;
 }
 
-/* What `assay validate` says at its end; of convergence alone, only where the page is. */
-static bool print_words(const char *path, const char *page, struct err *e)
+static bool print_github(const json_t *results, struct err *e)
 {
-    json_t *results;
-    if (!results_read(path, &results, e))
-        return false;
-    if (json_array_size(json_object_get(results, "claims")) > 0)
-        plain_words_print(stdout, results, page);
-    else
-        printf("%s\n", page);
-    json_decref(results);
-    return true;
-}
-
-static bool print_github(const char *path, struct err *e)
-{
-    json_t *results;
-    if (!results_read(path, &results, e))
-        return false;
     github_annotations_print(stdout, results);
-    json_decref(results);
     const char *summary = getenv("GITHUB_STEP_SUMMARY");
     if (summary == NULL || summary[0] == '\0')
         return true;
     FILE *f = fopen(summary, "a");
-    if (f == NULL)
-        return err_set(e, "%s: cannot be written", summary);
-    bool ok = print_markdown(f, path, true, e);
-    bool written = fclose(f) == 0;
-    return ok && (written || err_set(e, "%s: cannot be written", summary));
-}
-
-static bool print_matrix(const char *path, struct err *e)
-{
-    json_t *results;
-    if (!results_read(path, &results, e))
-        return false;
-    const json_t *convergence = json_object_get(results, "convergence");
-    bool has_claims = json_array_size(json_object_get(results, "claims")) > 0;
-    if (has_claims)
-        results_matrix_print(stdout, results);
-    if (has_claims && convergence != NULL)
-        putchar('\n');
-    if (convergence != NULL)
-        convergence_matrix_print(stdout, convergence);
-    json_decref(results);
-    return true;
+    if (f != NULL)
+        print_markdown(f, results, true);
+    return (f != NULL && fclose(f) == 0) || err_set(e, "%s: cannot be written", summary);
 }
 
 /* Family-wise, over all claims of the page. */
@@ -140,17 +97,26 @@ static int write_history(const char *dir, const char *out, struct err *e)
     return code;
 }
 
-/* The tables of one file or two. */
-static bool print_tables(const struct settings *s, struct err *e)
+/* What is asked for of one file, on the terminal; after the page, what `assay validate` says at its end, and of convergence alone
+ * only where the page is. */
+static bool print_one(const struct settings *s, const char *path, struct err *e)
 {
-    const char *path[] = {s->results, s->converge};
-    for (int i = 0; i < 2 && path[i] != NULL; i++) {
-        if (i > 0)
-            putchar('\n');
-        if (s->matrix ? !print_matrix(path[i], e) : !print_markdown(stdout, path[i], false, e))
-            return false;
-    }
-    return true;
+    json_t *results;
+    bool ok = true;
+    if (!results_read(path, &results, e))
+        return false;
+    if (s->github)
+        ok = print_github(results, e);
+    else if (s->matrix)
+        results_matrix_print(stdout, results);
+    else if (s->markdown)
+        print_markdown(stdout, results, false);
+    else if (json_array_size(json_object_get(results, "claims")) > 0)
+        plain_words_print(stdout, results, s->out);
+    else
+        printf("%s\n", s->out);
+    json_decref(results);
+    return ok;
 }
 
 /* Rules between options. */
@@ -176,15 +142,16 @@ int command_report(int argc, char **argv, struct err *e)
         return 0;
     if (s.history != NULL)
         return write_history(s.history, s.out, e);
-    if (s.github)
-        return print_github(s.results, e) ? 0 : EXIT_NOT_JUDGED;
-    if (s.matrix || s.markdown)
-        return print_tables(&s, e) ? 0 : EXIT_NOT_JUDGED;
     if (s.out == NULL) {
         beside = fs_beside_file(s.results, "index.html");
         s.out = beside.s;
     }
-    if (!report_write_with(s.results, s.converge, s.out, e))
-        return EXIT_NOT_JUDGED;
-    return print_words(s.results, s.out, e) ? 0 : EXIT_NOT_JUDGED;
+    const bool tables = s.matrix || s.markdown;
+    bool ok = s.github || tables || report_write_with(s.results, s.converge, s.out, e);
+    ok = ok && print_one(&s, s.results, e);
+    if (ok && tables && s.converge != NULL) {
+        putchar('\n');
+        ok = print_one(&s, s.converge, e);
+    }
+    return ok ? 0 : EXIT_NOT_JUDGED;
 }

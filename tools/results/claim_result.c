@@ -41,45 +41,38 @@ static json_t *statistics_json(const struct comparison *r)
 }
 
 /* Only what is known: a change that removes the difference, a variance ratio with an interval. */
-static bool add_findings(json_t *claim, const struct comparison *r)
+static json_t *findings_json(const struct comparison *r)
 {
     const struct hint *h = &r->hint;
     const struct variance_ratio *v = &r->variance;
-    bool ok = true;
+    json_t *hint = NULL, *ratio = NULL;
     if (h->name != NULL)
-        ok = json_object_set_new(claim, "hint",
-                                 json_pack("{s:s, s:f, s:f, s:s}", "name", h->name, "removed",
-                                           h->removed, "amount", h->amount, "unit", h->unit)) == 0;
+        hint = json_pack("{s:s, s:f, s:f, s:s}", "name", h->name, "removed", h->removed, "amount",
+                         h->amount, "unit", h->unit);
     if (v->valid)
-        ok = ok && json_object_set_new(
-                       claim, "variance_ratio",
-                       json_pack("{s:f, s:[f, f]}", "ratio", v->ratio, "ci", v->lo, v->hi)) == 0;
-    return ok;
+        ratio = json_pack("{s:f, s:[f, f]}", "ratio", v->ratio, "ci", v->lo, v->hi);
+    return json_pack("{s:o*, s:o*}", "hint", hint, "variance_ratio", ratio);
+}
+
+static const char *unless_empty(const char *text)
+{
+    return text[0] != '\0' ? text : NULL;
 }
 
 static json_t *claim_head(const struct claim_context *c)
 {
-    json_t *j =
-        json_pack("{s:s, s:s, s:s, s:s, s:s, s:f, s:f, s:f, s:i}", "scene",
-                  c->scene ? c->scene->name : "files", "quantity", "mean", "a", c->a, "b", c->b,
-                  "expected", verdict_name(c->expected), "alpha", c->opt.alpha, "margin_global",
-                  c->opt.margin_global, "margin_tile", c->opt.margin_tile, "tile", c->opt.tile);
-    if (j != NULL && c->scene != NULL) {
-        json_object_set_new(j, "title", json_string(c->scene->title));
-        if (c->scene->detects[0] != '\0')
-            json_object_set_new(j, "detects", json_string(c->scene->detects));
-        if (c->scene->blind_to[0] != '\0')
-            json_object_set_new(j, "blind_to", json_string(c->scene->blind_to));
-    }
-    if (j != NULL && c->accept_mdb[0] > 0) {
-        json_object_set_new(j, "accept_mdb",
-                            json_pack("[f, f]", c->accept_mdb[0], c->accept_mdb[1]));
-    }
-    if (j != NULL && c->fidelity != NULL)
-        json_object_set_new(j, "class", json_string(c->fidelity));
-    if (j != NULL && c->rerun != NULL)
-        json_object_set_new(j, "rerun", json_string(c->rerun));
-    return j;
+    const struct suite_scene *s = c->scene;
+    json_t *accepted = NULL;
+    if (c->accept_mdb[0] > 0)
+        accepted = json_pack("[f, f]", c->accept_mdb[0], c->accept_mdb[1]);
+    return json_pack("{s:s, s:s, s:s, s:s, s:s, s:f, s:f, s:f, s:i, s:s*, s:s*, s:s*, s:o*, s:s*, "
+                     "s:s*}",
+                     "scene", s ? s->name : "files", "quantity", "mean", "a", c->a, "b", c->b,
+                     "expected", verdict_name(c->expected), "alpha", c->opt.alpha, "margin_global",
+                     c->opt.margin_global, "margin_tile", c->opt.margin_tile, "tile", c->opt.tile,
+                     "title", s ? s->title : NULL, "detects", s ? unless_empty(s->detects) : NULL,
+                     "blind_to", s ? unless_empty(s->blind_to) : NULL, "accept_mdb", accepted,
+                     "class", c->fidelity, "rerun", c->rerun);
 }
 
 bool claim_result_passes(const struct claim_context *c, const struct comparison *r)
@@ -94,48 +87,44 @@ json_t *claim_result_judged(const struct claim_context *c, const struct comparis
     json_t *j = claim_head(c);
     const struct region *g = r->global;
     int tiles = r->tiles_x * r->tiles_y;
-    json_t *more = json_pack(
-        "{s:s, s:b, s:s, s:f, s:[f, f], s:[f, f, f], s:f, s:f, s:f, s:i, s:f, s:f, s:b, s:i, s:i, "
-        "s:i, s:o, s:o, s:o, s:o, s:o}",
-        "verdict", verdict_name(r->verdict), "passed", claim_result_passes(c, r), "reason",
-        r->reason, "difference", g[3].difference, "ci", g[3].ci_lo, g[3].ci_hi,
-        "channel_difference", g[0].difference, g[1].difference, g[2].difference, "log10_p",
-        g[3].log10_p, "mdb_global", r->mdb_global, "mdb_tile", r->mdb_tile, "num_tests",
-        r->num_tests, "rms_bias", r->rms_bias, "extra_factor", r->extra_factor, "skew_limited",
-        r->skew_limited, "finest_side", r->finest_side, "tiles_x", r->tiles_x, "tiles_y",
-        r->tiles_y, "worst", region_json(&r->worst), "worst_tile", region_json(&r->worst_tile),
-        "tile_log10_p", tile_array(r->tile_log10_p, tiles), "tile_t", tile_array(r->tile_t, tiles),
-        "statistics", statistics_json(r));
-    if (j == NULL || more == NULL || json_object_update(j, more) != 0 || !add_findings(j, r)) {
+    const bool ok =
+        json_object_update_new(
+            j,
+            json_pack(
+                "{s:s, s:b, s:s, s:f, s:[f, f], s:[f, f, f], s:f, s:f, s:f, s:i, s:f, s:f, s:b, s:i, s:i, "
+                "s:i, s:o, s:o, s:o, s:o, s:o}",
+                "verdict", verdict_name(r->verdict), "passed", claim_result_passes(c, r), "reason",
+                r->reason, "difference", g[3].difference, "ci", g[3].ci_lo, g[3].ci_hi,
+                "channel_difference", g[0].difference, g[1].difference, g[2].difference, "log10_p",
+                g[3].log10_p, "mdb_global", r->mdb_global, "mdb_tile", r->mdb_tile, "num_tests",
+                r->num_tests, "rms_bias", r->rms_bias, "extra_factor", r->extra_factor,
+                "skew_limited", r->skew_limited, "finest_side", r->finest_side, "tiles_x",
+                r->tiles_x, "tiles_y", r->tiles_y, "worst", region_json(&r->worst), "worst_tile",
+                region_json(&r->worst_tile), "tile_log10_p", tile_array(r->tile_log10_p, tiles),
+                "tile_t", tile_array(r->tile_t, tiles), "statistics", statistics_json(r))) == 0 &&
+        json_object_update_new(j, findings_json(r)) == 0;
+    if (!ok) {
         json_decref(j);
         j = NULL;
     }
-    json_decref(more);
     return j;
 }
 
 json_t *claim_result_not_judged(const struct claim_context *c, const char *error)
 {
     json_t *j = claim_head(c);
-    if (j != NULL) {
-        json_object_set_new(j, "passed", json_false());
-        json_object_set_new(j, "error", json_string(error));
-    }
+    json_object_set_new(j, "passed", json_false());
+    json_object_set_new(j, "error", json_string(error));
     return j;
 }
 
 bool claim_result_add_observations(json_t *claim, const char *side, const struct moments *m)
 {
-    char key[16];
     double n = moments_n(m, 0);
     for (size_t p = 1; p < (size_t)m->width * (size_t)m->height; p++)
-        n = moments_n(m, p) < n ? moments_n(m, p) : n;
-    snprintf(key, sizeof key, "n_%s", side);
-    bool ok = json_object_set_new(claim, key, json_real(n)) == 0;
-    snprintf(key, sizeof key, "unit_%s", side);
-    ok = ok && json_object_set_new(claim, key, json_string(m->unit)) == 0;
-    snprintf(key, sizeof key, "spp_%s", side);
-    return ok && json_object_set_new(claim, key, json_real(m->spp)) == 0;
+        n = fmin(n, moments_n(m, p));
+    return json_object_update_new(claim, json_pack("{s+:f, s+:s, s+:f}", "n_", side, n, "unit_",
+                                                   side, m->unit, "spp_", side, m->spp)) == 0;
 }
 
 /* "2 x AMD EPYC ...", or only the number where /proc does not say. */

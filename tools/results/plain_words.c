@@ -1,8 +1,5 @@
 #include "plain_words.h"
 
-#include "noise_results.h"
-#include "stated_error_results.h"
-
 #include <math.h>
 #include <string.h>
 
@@ -149,34 +146,31 @@ static size_t num_scenes(const json_t *claims)
     return num;
 }
 
-static void print_failures(FILE *f, const json_t *claims, const json_t *stated, const json_t *noise,
-                           size_t bad)
+/* The worst claims, then the others. bad: how many there are of all. */
+static void print_failures(FILE *f, const json_t *results, size_t bad)
 {
+    const json_t *claims = json_object_get(results, "claims");
     size_t said = 0, covered = 0;
-    for (int k = OUTCOME_NOT_JUDGED; k < OUTCOME_AS_EXPECTED; k++)
+    for (enum outcome k = OUTCOME_NOT_JUDGED; k < OUTCOME_AS_EXPECTED; k++)
         for (size_t i = 0; i < json_array_size(claims) && said < MOST_FAILURES; i++) {
             const json_t *claim = json_array_get(claims, i);
             const size_t same = k == OUTCOME_NOT_JUDGED ? results_num_with_error(claims, i) : 1;
-            if ((int)results_claim_outcome(claim) != k || same == 0)
+            if (results_claim_outcome(claim) != k || same == 0)
                 continue;
             fprintf(f, "%s%s", said++ == 0 ? ": " : "; ", plain_words_claim(claim).s);
             covered += same;
         }
-    for (size_t i = 0; i < json_array_size(stated) && said < MOST_FAILURES; i++) {
-        const json_t *c = json_array_get(stated, i);
-        if (stated_error_outcome(c) == OUTCOME_AS_EXPECTED)
+    struct results_walk w = {.results = results, .kind = JUDGED_STATED_ERROR};
+    while (said < MOST_FAILURES && results_next(&w) && w.kind != JUDGED_CONVERGENCE) {
+        if (w.outcome == OUTCOME_AS_EXPECTED)
             continue;
-        fprintf(f, "%sthe errors that renders of %s state are not those they have",
-                said++ == 0 ? ": " : "; ", member_or_empty(c, "scene"));
-        covered++;
-    }
-    for (size_t i = 0; i < json_array_size(noise) && said < MOST_FAILURES; i++) {
-        const json_t *c = json_array_get(noise, i);
-        if (noise_results_outcome(c) == OUTCOME_AS_EXPECTED)
-            continue;
-        const char *why = member_or_empty(c, member_text(c, "error") != NULL ? "error" : "reason");
-        fprintf(f, "%snoise of %s in %s: %s", said++ == 0 ? ": " : "; ",
-                member_or_empty(c, "engine"), member_or_empty(c, "scene"), why);
+        fputs(said++ == 0 ? ": " : "; ", f);
+        if (w.kind == JUDGED_STATED_ERROR)
+            fprintf(f, "the errors that renders of %s state are not those they have", w.scene);
+        else
+            fprintf(
+                f, "noise of %s in %s: %s", member_or_empty(w.json, "engine"), w.scene,
+                member_or_empty(w.json, member_text(w.json, "error") != NULL ? "error" : "reason"));
         covered++;
     }
     if (bad > covered)
@@ -186,23 +180,17 @@ static void print_failures(FILE *f, const json_t *claims, const json_t *stated, 
 void plain_words_print(FILE *f, const json_t *results, const char *page)
 {
     const json_t *claims = json_object_get(results, "claims"),
-                 *stated = json_object_get(results, "consistency"),
                  *noise = json_object_get(results, "noise");
-    const size_t num = json_array_size(claims), num_stated = json_array_size(stated);
-    size_t good = 0, good_stated = 0, mistakes = 0, good_noise = 0;
-    for (size_t i = 0; i < num; i++) {
-        const json_t *claim = json_array_get(claims, i);
-        const bool expected = results_claim_outcome(claim) == OUTCOME_AS_EXPECTED;
-        good += expected;
-        mistakes += expected && strcmp(member_or_empty(claim, "expected"), "DIFFERENT") == 0;
-    }
-    for (size_t i = 0; i < num_stated; i++)
-        good_stated += stated_error_outcome(json_array_get(stated, i)) == OUTCOME_AS_EXPECTED;
-    for (size_t i = 0; i < json_array_size(noise); i++)
-        good_noise += noise_results_outcome(json_array_get(noise, i)) == OUTCOME_AS_EXPECTED;
-    const size_t all = num + num_stated + json_array_size(noise),
-                 bad = all - good - good_stated - good_noise, scenes = num_scenes(claims),
+    const size_t num = json_array_size(claims), scenes = num_scenes(claims),
+                 num_stated = json_array_size(json_object_get(results, "consistency")),
                  noisy = num_scenes(noise);
+    size_t mistakes = 0, bad = 0;
+    for (struct results_walk w = {.results = results};
+         results_next(&w) && w.kind != JUDGED_CONVERGENCE;) {
+        bad += w.outcome != OUTCOME_AS_EXPECTED;
+        mistakes += w.kind == JUDGED_CLAIM && w.outcome == OUTCOME_AS_EXPECTED &&
+                    strcmp(member_or_empty(w.json, "expected"), "DIFFERENT") == 0;
+    }
     if (num > 0)
         fprintf(f, "\njudged: %s on %zu scene%s against %s: %zu comparison%s",
                 names(claims, "a", "programs").s, scenes, scenes == 1 ? "" : "s",
@@ -221,8 +209,9 @@ void plain_words_print(FILE *f, const json_t *results, const char *page)
         if (mistakes > 0)
             fprintf(f, ", %zu deliberate mistake%s found", mistakes, mistakes == 1 ? "" : "s");
     } else {
-        fprintf(f, "\nresult: %zu of %zu not as it should be", bad, all);
-        print_failures(f, claims, stated, noise, bad);
+        fprintf(f, "\nresult: %zu of %zu not as it should be", bad,
+                num + num_stated + json_array_size(noise));
+        print_failures(f, results, bad);
     }
     fprintf(f, "\nlook:   %s\n", page);
 }

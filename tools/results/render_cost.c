@@ -53,17 +53,11 @@ int render_cost_gather(const json_t *results, struct scene_cost out[MAX_COSTS])
         json_array_foreach(looks, k, look) e->largest_n =
             fmax(e->largest_n, is_probe ? 0 : member_number(look, "n_a"));
     }
-    json_array_foreach(json_object_get(results, "consistency"), i, c)
-    {
-        struct scene_cost *e = entry(out, &num, member_text(c, "scene"));
+    for (struct results_walk w = {.results = results, .kind = JUDGED_STATED_ERROR};
+         results_next(&w) && w.kind != JUDGED_CONVERGENCE;) {
+        struct scene_cost *e = entry(out, &num, w.scene);
         if (e != NULL)
-            e->ours_s += member_number(c, "seconds");
-    }
-    json_array_foreach(json_object_get(results, "noise"), i, c)
-    {
-        struct scene_cost *e = entry(out, &num, member_text(c, "scene"));
-        if (e != NULL)
-            e->ours_s += member_number(c, "seconds");
+            e->ours_s += member_number(w.json, "seconds");
     }
     qsort(out, (size_t)num, sizeof *out, by_total);
     return num;

@@ -322,12 +322,8 @@ static bool check_results(const json_t *root, const char *path, struct err *e)
 
 bool results_read(const char *path, json_t **out, struct err *e)
 {
-    json_error_t parse;
-    json_t *root = json_read(path, JSON_REJECT_DUPLICATES, &parse);
-    if (root == NULL)
-        return parse.line > 0 ? err_set(e, "%s:%d: %s", path, parse.line, parse.text)
-                              : err_set(e, "%s: %s", path, parse.text);
-    if (!check_results(root, path, e)) {
+    json_t *root = json_read_or_say(path, e);
+    if (root == NULL || !check_results(root, path, e)) {
         json_decref(root);
         return false;
     }
@@ -369,51 +365,62 @@ bool results_claim_lacks_time(const json_t *claim)
            strcmp(verdict, verdict_name(VERDICT_INCONCLUSIVE)) == 0;
 }
 
-static bool any_lacks_time(const json_t *list)
+bool results_next(struct results_walk *w)
 {
-    size_t i;
-    json_t *c;
-    json_array_foreach(list, i, c)
-    {
-        const char *reason = member_text(c, "reason");
-        if (results_claim_lacks_time(c) ||
-            (reason != NULL && strncmp(reason, BUDGET_SPENT, sizeof BUDGET_SPENT - 1) == 0))
+    static const struct {
+        const char *key;
+        enum outcome (*outcome)(const json_t *judged);
+    } lists[NUM_JUDGED] = {[JUDGED_CLAIM] = {"claims", results_claim_outcome},
+                           [JUDGED_STATED_ERROR] = {"consistency", stated_error_outcome},
+                           [JUDGED_NOISE] = {"noise", noise_results_outcome},
+                           [JUDGED_CONVERGENCE] = {"convergence", convergence_results_outcome}};
+    while (w->kind < NUM_JUDGED) {
+        const json_t *row = json_array_get(json_object_get(w->results, lists[w->kind].key), w->row);
+        const json_t *engines = json_object_get(row, "engines");
+        if (row == NULL) {
+            w->kind++;
+            w->row = 0;
+        } else if (engines != NULL && w->engine == json_array_size(engines)) {
+            w->row++;
+            w->engine = 0;
+        } else {
+            w->json = engines != NULL ? json_array_get(engines, w->engine++) : row;
+            w->scene = member_text(row, "scene");
+            w->outcome = lists[w->kind].outcome(w->json);
+            w->lacks_time = w->kind == JUDGED_CLAIM && results_claim_lacks_time(w->json);
+            w->index = w->row;
+            w->row += engines == NULL;
             return true;
+        }
     }
     return false;
 }
 
+size_t results_count(const json_t *results, enum judged kind, size_t count[OUTCOME_AS_EXPECTED + 1])
+{
+    struct results_walk w = {.results = results, .kind = kind};
+    size_t num = 0;
+    memset(count, 0, (OUTCOME_AS_EXPECTED + 1) * sizeof *count);
+    for (; results_next(&w) && w.kind == kind; num++)
+        count[w.outcome]++;
+    return num;
+}
+
 bool results_lack_time(const json_t *results)
 {
-    return any_lacks_time(json_object_get(results, "claims")) ||
-           any_lacks_time(json_object_get(results, "consistency")) ||
-           any_lacks_time(json_object_get(results, "noise"));
+    for (struct results_walk w = {.results = results}; results_next(&w);)
+        if (results_claim_lacks_time(w.json) ||
+            strncmp(member_or_empty(w.json, "reason"), BUDGET_SPENT, strlen(BUDGET_SPENT)) == 0)
+            return true;
+    return false;
 }
 
 int results_exit_code(const json_t *results)
 {
-    const json_t *claims = json_object_get(results, "claims");
-    size_t count[4] = {0};
-    for (size_t i = 0; i < json_array_size(claims); i++)
-        count[results_claim_lacks_time(json_array_get(claims, i))
-                  ? OUTCOME_UNDECIDED
-                  : results_claim_outcome(json_array_get(claims, i))]++;
-    const json_t *convergence = json_object_get(results, "convergence");
-    for (size_t i = 0; i < json_array_size(convergence); i++) {
-        const json_t *engines = json_object_get(json_array_get(convergence, i), "engines");
-        for (size_t k = 0; k < json_array_size(engines); k++)
-            count[convergence_results_outcome(json_array_get(engines, k))]++;
-    }
-    const json_t *consistency = json_object_get(results, "consistency");
-    for (size_t i = 0; i < json_array_size(consistency); i++)
-        count[stated_error_outcome(json_array_get(consistency, i))]++;
-    const json_t *noise = json_object_get(results, "noise");
-    for (size_t i = 0; i < json_array_size(noise); i++)
-        count[noise_results_outcome(json_array_get(noise, i))]++;
-    if (json_array_size(claims) + json_array_size(convergence) + json_array_size(consistency) +
-                json_array_size(noise) ==
-            0 ||
-        count[OUTCOME_NOT_JUDGED] > 0)
+    size_t count[OUTCOME_AS_EXPECTED + 1] = {0}, num = 0;
+    for (struct results_walk w = {.results = results}; results_next(&w); num++)
+        count[w.lacks_time ? OUTCOME_UNDECIDED : w.outcome]++;
+    if (num == 0 || count[OUTCOME_NOT_JUDGED] > 0)
         return EXIT_NOT_JUDGED;
     if (count[OUTCOME_OPPOSITE] > 0)
         return EXIT_DIFFERENT;

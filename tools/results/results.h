@@ -34,6 +34,25 @@ size_t results_num_with_error(const json_t *claims, size_t i);
  * like any that was not judged, but counts as INCONCLUSIVE. */
 bool results_claim_lacks_time(const json_t *claim);
 
+/* All that a file judges, one after the other: claims, stated errors ("consistency"), noise, engines of the convergence. Set
+ * `results`, and `kind` to begin with that; the rest is zero. */
+enum judged { JUDGED_CLAIM, JUDGED_STATED_ERROR, JUDGED_NOISE, JUDGED_CONVERGENCE, NUM_JUDGED };
+struct results_walk {
+    const json_t *results;
+    enum judged kind;
+    const json_t *json; /* the claim, row or engine */
+    const char *scene;
+    enum outcome outcome;
+    bool lacks_time;    /* results_claim_lacks_time() */
+    size_t index;       /* in its list */
+    size_t row, engine; /* what comes next */
+};
+/* False past the last. */
+bool results_next(struct results_walk *w);
+/* How many of one kind there are; by outcome in count. */
+size_t results_count(const json_t *results, enum judged kind,
+                     size_t count[OUTCOME_AS_EXPECTED + 1]);
+
 /* How the reason begins of what was not decided when the time of --budget was over; and whether there is such a claim or one that
  * lacks time. */
 #define BUDGET_SPENT "budget spent"

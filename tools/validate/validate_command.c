@@ -181,36 +181,24 @@ static bool write_all(const json_t *results, const char *out_dir, bool quiet, st
 /* The one line on stderr that exit code 3 owes, also where the table on stdout has gone elsewhere. */
 static void tell_not_judged(const json_t *results, struct err *e)
 {
-    const json_t *claims = json_object_get(results, "claims"), *first = NULL;
+    struct results_walk first = {.kind = NUM_JUDGED};
     size_t n = 0;
-    for (size_t i = json_array_size(claims); i-- > 0;) {
-        const json_t *claim = json_array_get(claims, i);
-        if (results_claim_outcome(claim) == OUTCOME_NOT_JUDGED &&
-            !results_claim_lacks_time(claim)) {
-            first = claim;
-            n++;
-        }
+    for (struct results_walk w = {.results = results}; results_next(&w);) {
+        if (w.outcome != OUTCOME_NOT_JUDGED || w.lacks_time)
+            continue;
+        n += w.kind == JUDGED_CLAIM;
+        if (first.kind == NUM_JUDGED)
+            first = w;
     }
-    json_t *consistency = json_object_get(results, "consistency");
-    for (size_t i = 0; first == NULL && i < json_array_size(consistency); i++) {
-        const json_t *c = json_array_get(consistency, i);
-        if (stated_error_outcome(c) == OUTCOME_NOT_JUDGED) {
-            err_set(e, "%s, its stated errors: %s", member_text(c, "scene"),
-                    member_text(c, "error"));
-            return;
-        }
-    }
-    const json_t *noise = json_object_get(results, "noise");
-    for (size_t i = 0; first == NULL && i < json_array_size(noise); i++) {
-        const json_t *c = json_array_get(noise, i);
-        if (noise_results_outcome(c) == OUTCOME_NOT_JUDGED) {
-            err_set(e, "%s, its noise: %s", member_text(c, "scene"), member_text(c, "error"));
-            return;
-        }
-    }
-    err_set(e, "%zu of %zu claims could not be judged; %s, %s against %s: %s", n,
-            json_array_size(claims), member_text(first, "scene"), member_text(first, "a"),
-            member_text(first, "b"), member_text(first, "error"));
+    if (first.kind == JUDGED_CLAIM)
+        err_set(e, "%zu of %zu claims could not be judged; %s, %s against %s: %s", n,
+                json_array_size(json_object_get(results, "claims")), first.scene,
+                member_text(first.json, "a"), member_text(first.json, "b"),
+                member_text(first.json, "error"));
+    else
+        err_set(e, "%s, its %s: %s", first.scene,
+                first.kind == JUDGED_NOISE ? "noise" : "stated errors",
+                member_text(first.json, "error"));
 }
 
 /* Not judged counts most, then a difference, then an inconclusive claim. */

@@ -3,7 +3,7 @@
  * beforehand; nothing is drawn again. */
 #include "tools/stats/convergence_rate.h"
 #include "tools/results/convergence_results.h"
-#include "tools/results/convergence_matrix.h"
+#include "tools/results/results_matrix.h"
 #include "tools/report/report.h"
 #include "tests/support/test.h"
 
@@ -483,7 +483,7 @@ TEST(results_become_a_matrix)
     FILE *f = open_memstream(&text, &size);
     json_object_set_new(json_array_get(json_object_get(scene, "engines"), 0), "floor_verdict",
                         json_string("INCONCLUSIVE"));
-    convergence_matrix_print(f, json_object_get(root, "convergence"));
+    results_matrix_print(f, root);
     fclose(f);
     /* No Sobol here, and Cycles could not be judged: empty cells. */
     const char *row = strstr(text, "| 41_cornell");
