@@ -138,9 +138,10 @@ static void print_noise(const struct variance_ratio *v)
         printf("noise: the variance of one path of A is %.3g [%.3g, %.3g] times that of B\n",
                v->ratio, v->lo, v->hi);
     else if (v->ratio > 0)
-        printf("noise: the variance of one path of A is about %.2g times that of B; rare bright paths "
-               "leave no interval\n",
-               v->ratio);
+        printf(
+            "noise: the variance of one path of A is about %.2g times that of B; rare bright paths "
+            "leave no interval\n",
+            v->ratio);
 }
 
 static void print_result(const struct compare_job *job, const struct compared *c)

@@ -1,6 +1,7 @@
 /* assay golden render | status | approve: from rendering a reference to storing it. */
 #include "reference/suite/suite_own.h"
 #include "renderer/base/cli.h"
+#include "renderer/base/fs.h"
 #include "tools/base/data_dirs.h"
 #include "tools/golden/approve.h"
 #include "tools/golden/noise_record.h"
@@ -59,35 +60,18 @@ static const struct suite_reference *rendered_reference(const struct suite *suit
     return NULL;
 }
 
-/* "SCENE" or "SCENE/ENGINE". */
-static bool is_named(const char *name, const struct suite_scene *scene,
-                     const struct suite_reference *ref)
+/* "SCENE" or "SCENE/WHAT": an engine, or "noise". */
+static bool is_named(const char *name, const struct suite_scene *scene, const char *what)
 {
     size_t n = strlen(scene->name);
     return strncmp(name, scene->name, n) == 0 &&
-           (name[n] == '\0' || (name[n] == '/' && strcmp(name + n + 1, ref->engine) == 0));
+           (name[n] == '\0' || (name[n] == '/' && strcmp(name + n + 1, what) == 0));
 }
 
-static bool is_selected(const struct settings *s, const struct suite_scene *scene,
-                        const struct suite_reference *ref)
+static bool is_selected(const struct settings *s, const struct suite_scene *scene, const char *what)
 {
     for (int i = 0; i < s->num_names; i++)
-        if (is_named(s->names[i], scene, ref))
-            return true;
-    return s->num_names == 0;
-}
-
-static bool is_named_noise(const char *name, const struct suite_scene *scene)
-{
-    size_t n = strlen(scene->name);
-    return strncmp(name, scene->name, n) == 0 &&
-           (name[n] == '\0' || strcmp(name + n, "/noise") == 0);
-}
-
-static bool is_selected_noise(const struct settings *s, const struct suite_scene *scene)
-{
-    for (int i = 0; i < s->num_names; i++)
-        if (is_named_noise(s->names[i], scene))
+        if (is_named(s->names[i], scene, what))
             return true;
     return s->num_names == 0;
 }
@@ -102,9 +86,9 @@ static bool check_names(const struct settings *s, const struct suite *suite, str
         const struct suite_reference *ref;
         bool found = false;
         for (int i = 0; !found && (ref = rendered_reference(suite, i, &scene)) != NULL; i++)
-            found = is_named(s->names[n], scene, ref);
+            found = is_named(s->names[n], scene, ref->engine);
         for (int i = 0; !found && i < suite->num_scenes; i++)
-            found = is_named_noise(s->names[n], &suite->scene[i]);
+            found = is_named(s->names[n], &suite->scene[i], "noise");
         if (!found)
             return err_set(e, "%s: the suite in %s has no such reference", s->names[n],
                            s->suite_dir);
@@ -122,20 +106,22 @@ static bool is_current(const struct settings *s, const struct suite_scene *scene
     return current;
 }
 
-/* What the suite no longer has is not for approval. */
+/* What the suite no longer has is not for approval; *num: how many there are, `first`: one of them. */
 static bool print_orphans(const char *dir, const struct suite *suite, size_t *num,
-                          const char **first, json_t **names, struct err *e)
+                          struct path *first, struct err *e)
 {
-    if (!golden_orphans(dir, suite, names, e))
-        return false;
+    json_t *names, *value;
     const char *name;
-    json_t *value;
-    *num = json_object_size(*names);
-    *first = *num > 0 ? json_object_iter_key(json_object_iter(*names)) : "";
-    json_object_foreach(*names, name, value)
+    *num = 0;
+    if (!golden_orphans(dir, suite, &names, e))
+        return false;
+    json_object_foreach(names, name, value)
     {
+        if ((*num)++ == 0)
+            *first = fs_path("%s", name);
         printf("%-8s %s/%s: not in the suite\n", "orphan", dir, name);
     }
+    json_decref(names);
     return true;
 }
 
@@ -158,11 +144,9 @@ static int status(const struct settings *s, const struct suite *suite, struct er
     for (int i = 0; noise && i < suite->num_scenes; i++)
         if (strcmp(suite->scene[i].references_of, suite->scene[i].name) == 0)
             bad += noise_record_status(s->opt.golden_dir, &suite->scene[i], stdout);
-    json_t *names;
-    const char *first;
-    if (!print_orphans(s->opt.golden_dir, suite, &orphans, &first, &names, e))
+    struct path first;
+    if (!print_orphans(s->opt.golden_dir, suite, &orphans, &first, e))
         return EXIT_NOT_JUDGED;
-    json_decref(names);
     if (bad + orphans == 0)
         return EXIT_EQUIVALENT;
     err_set(e, "%zu of %d stored references are not current, %zu have no place in the suite", bad,
@@ -190,11 +174,11 @@ static int approve_all(const struct settings *s, const struct suite *suite, stru
     if (!check_names(s, suite, e))
         return EXIT_NOT_JUDGED;
     for (int i = 0; (ref = rendered_reference(suite, i, &scene)) != NULL; i++)
-        selected += is_selected(s, scene, ref);
+        selected += is_selected(s, scene, ref->engine);
     opt.alpha = s->opt.alpha / (selected > 0 ? selected : 1);
     for (int i = 0; (ref = rendered_reference(suite, i, &scene)) != NULL; i++) {
         /* Under --all a reference that is up to date needs no candidate. */
-        if (!is_selected(s, scene, ref) ||
+        if (!is_selected(s, scene, ref->engine) ||
             (s->all && !golden_is_there(s->opt.from_dir, scene, ref) && is_current(s, scene, ref)))
             continue;
         struct err why = {0};
@@ -208,14 +192,12 @@ static int approve_all(const struct settings *s, const struct suite *suite, stru
         count[done]++;
     }
     for (int i = 0; i < suite->num_scenes; i++)
-        if (is_selected_noise(s, &suite->scene[i]))
+        if (is_selected(s, &suite->scene[i], "noise"))
             noise_record_approve(&opt, &suite->scene[i], stdout, count, e);
-    json_t *names = NULL;
-    const char *first = "";
+    struct path first;
     size_t orphans = 0;
     struct err why = {0};
-    if (s->num_names == 0 &&
-        !print_orphans(s->opt.from_dir, suite, &orphans, &first, &names, &why) &&
+    if (s->num_names == 0 && !print_orphans(s->opt.from_dir, suite, &orphans, &first, &why) &&
         count[APPROVE_IMPOSSIBLE]++ == 0)
         *e = why;
     printf(
@@ -224,8 +206,7 @@ static int approve_all(const struct settings *s, const struct suite *suite, stru
         count[APPROVE_INCONCLUSIVE],
         count[APPROVE_IMPOSSIBLE] + (suite->is_own ? 0 : (int)orphans));
     if (orphans > 0 && !suite->is_own && count[APPROVE_IMPOSSIBLE]++ == 0)
-        err_set(e, "%s/%s: not in the suite", s->opt.from_dir, first);
-    json_decref(names);
+        err_set(e, "%s/%s: not in the suite", s->opt.from_dir, first.s);
     return count[APPROVE_IMPOSSIBLE] > 0     ? EXIT_NOT_JUDGED
            : count[APPROVE_DIFFERENT] > 0    ? EXIT_DIFFERENT
            : count[APPROVE_INCONCLUSIVE] > 0 ? EXIT_INCONCLUSIVE
@@ -243,7 +224,8 @@ static int compare_all(const struct settings *s, const struct suite *suite, stru
     if (s->num_names > 0 && !check_names(s, suite, e))
         return EXIT_NOT_JUDGED;
     for (int i = 0; (ref = rendered_reference(suite, i, &scene)) != NULL; i++)
-        selected += is_selected(s, scene, ref) && golden_is_there(s->opt.from_dir, scene, ref);
+        selected +=
+            is_selected(s, scene, ref->engine) && golden_is_there(s->opt.from_dir, scene, ref);
     if (selected == 0) {
         err_set(e, "no candidates in %s: `assay golden render` makes them", s->opt.from_dir);
         return EXIT_NOT_JUDGED;
@@ -252,7 +234,7 @@ static int compare_all(const struct settings *s, const struct suite *suite, stru
     approve_compare_heading(stdout);
     for (int i = 0; (ref = rendered_reference(suite, i, &scene)) != NULL; i++) {
         struct err why = {0};
-        if (!is_selected(s, scene, ref) || !golden_is_there(s->opt.from_dir, scene, ref))
+        if (!is_selected(s, scene, ref->engine) || !golden_is_there(s->opt.from_dir, scene, ref))
             continue;
         if (!approve_compare(&opt, scene, ref, stdout, &verdict, &why)) {
             printf("%-20s  not compared: %s\n", scene->name, why.msg);

@@ -1,6 +1,7 @@
 #include "converge_run.h"
 
 #include "reference/truth/truth.h"
+#include "reference/base/json_node.h"
 #include "renderer/base/fs.h"
 #include "renderer/base/version.h"
 #include "tools/results/claim_result.h"
@@ -129,21 +130,11 @@ static void climb(const struct run *r, const struct converge_job *job, int engin
         out->cost = convergence_rate_cost(out->rung, o->num_rungs);
 }
 
-static json_t *number(double v)
-{
-    return isfinite(v) ? json_real(v) : json_null();
-}
-
-static json_t *pair(double lo, double hi)
-{
-    return isfinite(lo) && isfinite(hi) ? json_pack("[f, f]", lo, hi) : json_null();
-}
-
 /* exp of an interval of a logarithm, to a power; null where it says nothing (a factor of e^20). */
 static json_t *exp_pair(struct estimate x, double alpha, double power)
 {
     struct interval i = estimate_interval(x, alpha);
-    return i.hi - i.lo < 20 ? pair(exp(power * i.lo), exp(power * i.hi)) : json_null();
+    return i.hi - i.lo < 20 ? json_interval(exp(power * i.lo), exp(power * i.hi)) : json_null();
 }
 
 static json_t *rung_json(const struct rung *g, const struct cost *c, double alpha)
@@ -154,7 +145,7 @@ static json_t *rung_json(const struct rung *g, const struct cost *c, double alph
                      exp(0.5 * g->log_mse.value), "rmse_ci", exp_pair(g->log_mse, alpha, 0.5),
                      "variance", exp(g->log_variance.value), "variance_ci",
                      exp_pair(g->log_variance, alpha, 1), "bias", bias, "cpu_s", g->cpu_s,
-                     "efficiency", number(exp(eff.value)), "efficiency_ci",
+                     "efficiency", json_finite(exp(eff.value)), "efficiency_ci",
                      exp_pair(eff, alpha, 1));
 }
 
@@ -188,36 +179,31 @@ static json_t *verdict_json(const struct run *r, int engine, const struct ladder
              : vf == VERDICT_INCONCLUSIVE ? "not shown to be below"
                                           : "below",
              100 * o->margin, 100 * fi.lo, 100 * fi.hi);
-    return json_pack("{s:f, s:o, s:s, s:o, s:s, s:s, s:b, s:s}", "slope", slope.value, "slope_ci",
-                     pair(si.lo, si.hi), "slope_verdict",
-                     judge_slope ? verdict_name(vs) : "MEASURED", "floor_ci", pair(fi.lo, fi.hi),
-                     "floor_verdict", judged ? verdict_name(vf) : "MEASURED", "verdict",
-                     judged ? verdict_name(v) : "MEASURED", "passed",
-                     !judged || v == VERDICT_EQUIVALENT, "reason", reason);
+    return json_pack(
+        "{s:f, s:o, s:s, s:o, s:s, s:s, s:b, s:s}", "slope", slope.value, "slope_ci",
+        json_interval(si.lo, si.hi), "slope_verdict", judge_slope ? verdict_name(vs) : "MEASURED",
+        "floor_ci", json_interval(fi.lo, fi.hi), "floor_verdict",
+        judged ? verdict_name(vf) : "MEASURED", "verdict", judged ? verdict_name(v) : "MEASURED",
+        "passed", !judged || v == VERDICT_EQUIVALENT, "reason", reason);
 }
 
 static json_t *engine_json(const struct run *r, int engine, const struct ladder *l)
 {
     json_t *j = json_pack("{s:s, s:b, s:b}", "engine", converge_engine_names[engine], "independent",
                           is_independent(engine), "judged", is_judged(engine));
-    if (j == NULL)
-        return NULL;
     if (!l->present) {
         json_object_set_new(j, "passed", json_false());
         json_object_set_new(j, "error", json_string(l->e.msg));
         return j;
     }
-    json_t *rungs = json_array(), *verdict = verdict_json(r, engine, l);
+    json_t *rungs = json_array();
     for (int i = 0; i < r->opt->num_rungs; i++)
         json_array_append_new(rungs, rung_json(&l->rung[i], &l->cost, r->alpha));
-    json_object_update(j, verdict);
-    json_decref(verdict);
-    const char *version = is_judged(engine) ? assay_version : l->version;
-    if (version != NULL)
-        json_object_set_new(j, "version", json_string(version));
-    json_object_set_new(j, "start_s", number(l->cost.start_s));
-    json_object_set_new(j, "cpu_s_per_spp", number(l->cost.per_spp.value));
-    json_object_set_new(j, "rungs", rungs);
+    json_object_update_new(j, verdict_json(r, engine, l));
+    json_object_update_new(j, json_pack("{ss*,so,so,so}", "version",
+                                        is_judged(engine) ? assay_version : l->version, "start_s",
+                                        json_finite(l->cost.start_s), "cpu_s_per_spp",
+                                        json_finite(l->cost.per_spp.value), "rungs", rungs));
     return j;
 }
 
@@ -231,10 +217,11 @@ static json_t *ratio_json(const struct run *r, int a, const struct ladder *la, i
         struct estimate eb = convergence_rate_log_efficiency(&lb->rung[i], &lb->cost);
         double var = ea.se * ea.se + eb.se * eb.se;
         struct estimate eff = {ea.value - eb.value, sqrt(var), fmin(ea.dof, eb.dof)};
-        json_array_append_new(
-            rungs, json_pack("{s:f, s:f, s:o, s:o, s:o}", "spp", la->rung[i].spp, "variance",
-                             exp(v.value), "variance_ci", exp_pair(v, r->alpha, 1), "efficiency",
-                             number(exp(eff.value)), "efficiency_ci", exp_pair(eff, r->alpha, 1)));
+        json_array_append_new(rungs, json_pack("{s:f, s:f, s:o, s:o, s:o}", "spp", la->rung[i].spp,
+                                               "variance", exp(v.value), "variance_ci",
+                                               exp_pair(v, r->alpha, 1), "efficiency",
+                                               json_finite(exp(eff.value)), "efficiency_ci",
+                                               exp_pair(eff, r->alpha, 1)));
     }
     return json_pack("{s:s, s:s, s:o}", "a", converge_engine_names[a], "b",
                      converge_engine_names[b], "rungs", rungs);
@@ -284,19 +271,16 @@ static bool run_scene(const struct run *r, const struct suite_scene *scene, json
         for (int b = a + 1; b < CONVERGE_NUM_ENGINES; b++)
             if (ladder[a].present && ladder[b].present)
                 json_array_append_new(ratios, ratio_json(r, a, &ladder[a], b, &ladder[b]));
-    json_t *j =
-        json_pack("{s:s, s:s, s:i, s:i, s:i, s:i, s:s, s:f, s:f, s:f, s:f, s:o, s:o}", "scene",
-                  scene->name, "title", scene->title, "width", small.width, "height", small.height,
-                  "depth", scene->depth, "replicates", o->replicates, "reference", name,
-                  "reference_noise", sqrt(ref.noise), "alpha", r->alpha, "margin", o->margin,
-                  "slope_margin", o->slope_margin, "engines", engines, "ratios", ratios);
-    if (depths != NULL)
-        json_object_set_new(j, "depths", depths);
+    json_t *j = json_pack("{s:s, s:s, s:i, s:i, s:i, s:i, s:s, s:f, s:f, s:f, s:f, s:o, s:o, s:o*}",
+                          "scene", scene->name, "title", scene->title, "width", small.width,
+                          "height", small.height, "depth", scene->depth, "replicates",
+                          o->replicates, "reference", name, "reference_noise", sqrt(ref.noise),
+                          "alpha", r->alpha, "margin", o->margin, "slope_margin", o->slope_margin,
+                          "engines", engines, "ratios", ratios, "depths", depths);
     for (int k = 0; k < CONVERGE_NUM_ENGINES; k++)
         free(ladder[k].version);
     convergence_rate_reference_free(&ref);
-    return (j != NULL && json_array_append_new(convergence, j) == 0) ||
-           err_set(e, "out of memory for the results");
+    return json_array_append_new(convergence, j) == 0;
 }
 
 /* Bonferroni over all that is judged in this run. */

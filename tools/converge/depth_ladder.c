@@ -43,7 +43,7 @@ static bool measure_one(const struct converge_job *job, const struct suite_refer
         json_decref(rung);
         return err_set(e, "%s", none.msg);
     }
-    return json_array_append_new(rungs, rung) == 0 || err_set(e, "out of memory for the results");
+    return json_array_append_new(rungs, rung) == 0;
 }
 
 bool depth_ladder_measure(const struct converge_job *job, const struct suite_reference *truth,
@@ -51,16 +51,13 @@ bool depth_ladder_measure(const struct converge_job *job, const struct suite_ref
 {
     json_t *rungs = json_array();
     int last = job->scene->depth;
-    bool ok = rungs != NULL || err_set(e, "out of memory for the results");
+    bool ok = true;
     for (int depth = 0; ok && depth <= last;) {
         ok = measure_one(job, truth, spp, depth, rungs, e);
         int next = depth < 8 ? depth + 1 : depth + depth / 2;
         depth = next < last || depth == last ? next : last;
     }
-    if (!ok) {
-        json_decref(rungs);
-        return false;
-    }
-    *out = json_pack("{s:i, s:o}", "samples", spp, "rungs", rungs);
-    return *out != NULL || err_set(e, "out of memory for the results");
+    *out = ok ? json_pack("{s:i, s:O}", "samples", spp, "rungs", rungs) : NULL;
+    json_decref(rungs);
+    return ok;
 }

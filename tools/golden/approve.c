@@ -32,35 +32,60 @@ static json_t *effect_json(const struct comparison *r, double alpha)
                      alpha);
 }
 
-/* Stores the candidate with one change more than the stored one had. Takes over `change`. */
-static bool store(const struct approve_options *opt, const struct suite_scene *scene,
-                  const struct suite_reference *ref, const struct golden *candidate,
-                  const struct golden *stored, const char *verdict, json_t *change, struct err *e)
+/* A candidate beside what is stored, on its way. */
+struct pair {
+    const struct approve_options *opt;
+    const struct suite_scene *scene;
+    const struct suite_reference *ref;
+    struct golden candidate, stored;
+    FILE *out;
+};
+
+static struct pair pair_open(const struct approve_options *opt, const struct suite_scene *scene,
+                             const struct suite_reference *ref, FILE *out)
 {
-    json_t *entry = json_copy(candidate->manifest);
-    json_t *old = json_object_get(stored->manifest, "changes");
-    json_t *changes = old != NULL ? json_copy(old) : json_array();
-    bool ok = entry != NULL && changes != NULL && change != NULL &&
-              json_object_set_new(change, "date", json_string(utc_date_now().s)) == 0 &&
-              json_object_set_new(change, "verdict", json_string(verdict)) == 0;
-    if (ok && stored->manifest != NULL) {
+    struct pair p = {.opt = opt, .scene = scene, .ref = ref, .out = out};
+    golden_inspect(opt->from_dir, scene, ref, &p.candidate);
+    golden_inspect(opt->golden_dir, scene, ref, &p.stored);
+    return p;
+}
+
+static void pair_close(struct pair *p)
+{
+    golden_free(&p->candidate);
+    golden_free(&p->stored);
+}
+
+/* Stores the candidate with one change more than the stored one had. Takes over `change`. */
+static enum approval accept(const struct pair *p, const char *verdict, json_t *change,
+                            struct err *e)
+{
+    static const char *const keys[] = {"version", "seed", "scene_sha256", "exr_sha256", "date"};
+    const json_t *stored = p->stored.manifest, *old = json_object_get(stored, "changes");
+    json_t *entry = json_copy(p->candidate.manifest),
+           *changes = old != NULL ? json_copy((json_t *)old) : json_array();
+    json_object_set_new(change, "date", json_string(utc_date_now().s));
+    json_object_set_new(change, "verdict", json_string(verdict));
+    if (stored != NULL) {
         json_t *was = json_object();
-        static const char *const keys[] = {"version", "seed", "scene_sha256", "exr_sha256", "date"};
-        for (size_t i = 0; i < sizeof keys / sizeof *keys; i++) {
-            json_t *v = json_object_get(stored->manifest, keys[i]);
-            if (v != NULL)
-                json_object_set(was, keys[i], v);
-        }
-        ok = json_object_set_new(change, "was", was) == 0;
+        for (size_t i = 0; i < sizeof keys / sizeof *keys; i++)
+            json_object_set(was, keys[i], json_object_get(stored, keys[i]));
+        json_object_set_new(change, "was", was);
     }
-    ok = ok && json_array_append(changes, change) == 0 &&
-         json_object_set(entry, "changes", changes) == 0;
-    ok = ok ? golden_write(opt->golden_dir, scene->name, ref->engine, &candidate->m, entry, e)
-            : err_set(e, "%s/%s: out of memory", scene->name, ref->engine);
-    json_decref(changes);
-    json_decref(change);
+    json_array_append_new(changes, change);
+    json_object_set_new(entry, "changes", changes);
+    bool ok =
+        golden_write(p->opt->golden_dir, p->scene->name, p->ref->engine, &p->candidate.m, entry, e);
     json_decref(entry);
-    return ok;
+    if (ok)
+        fprintf(p->out, "  approved\n");
+    return ok ? APPROVE_ACCEPTED : APPROVE_IMPOSSIBLE;
+}
+
+static enum approval refuse_difference(const struct pair *p)
+{
+    fprintf(p->out, "  refused: give --accept-difference \"why\"\n");
+    return APPROVE_DIFFERENT;
 }
 
 /* Bit for bit, whatever else the two files hold. */
@@ -74,144 +99,111 @@ static bool same_moments(const struct moments *a, const struct moments *b)
            memcmp(a->m3, b->m3, 3 * pixels * sizeof *a->m3) == 0;
 }
 
-static enum approval stored_or_not(bool ok, FILE *out)
-{
-    if (ok)
-        fprintf(out, "  approved\n");
-    return ok ? APPROVE_ACCEPTED : APPROVE_IMPOSSIBLE;
-}
-
 /* Same bits: there is no statistics to do. The manifest may still tell of another scene file or key. */
-static enum approval approve_identical(const struct approve_options *opt,
-                                       const struct suite_scene *scene,
-                                       const struct suite_reference *ref,
-                                       const struct golden *candidate, const struct golden *stored,
-                                       FILE *out, struct err *e)
+static enum approval approve_identical(const struct pair *p, struct err *e)
 {
-    fprintf(out, "  IDENTICAL: the same bits\n");
-    if (stored->state == GOLDEN_CURRENT &&
-        strcmp(text_of(stored->manifest, "key"), text_of(candidate->manifest, "key")) == 0)
+    fprintf(p->out, "  IDENTICAL: the same bits\n");
+    if (p->stored.state == GOLDEN_CURRENT &&
+        strcmp(text_of(p->stored.manifest, "key"), text_of(p->candidate.manifest, "key")) == 0)
         return APPROVE_UNCHANGED;
-    return stored_or_not(store(opt, scene, ref, candidate, stored, "IDENTICAL", json_object(), e),
-                         out);
+    return accept(p, "IDENTICAL", json_object(), e);
 }
 
 /* Another size: no statistic compares them, only a person can. */
-static enum approval approve_incomparable(const struct approve_options *opt,
-                                          const struct suite_scene *scene,
-                                          const struct suite_reference *ref,
-                                          const struct golden *candidate,
-                                          const struct golden *stored, FILE *out, struct err *e)
+static enum approval approve_incomparable(const struct pair *p, struct err *e)
 {
-    fprintf(out, "  NOT COMPARABLE: %d x %d pixels, stored are %d x %d\n", candidate->m.width,
-            candidate->m.height, stored->m.width, stored->m.height);
-    if (opt->why == NULL) {
-        fprintf(out, "  refused: give --accept-difference \"why\"\n");
-        return APPROVE_DIFFERENT;
-    }
-    return stored_or_not(store(opt, scene, ref, candidate, stored, "NOT COMPARABLE",
-                               json_pack("{s:s}", "why", opt->why), e),
-                         out);
+    const struct moments *m = &p->candidate.m, *was = &p->stored.m;
+    fprintf(p->out, "  NOT COMPARABLE: %d x %d pixels, stored are %d x %d\n", m->width, m->height,
+            was->width, was->height);
+    if (p->opt->why == NULL)
+        return refuse_difference(p);
+    return accept(p, "NOT COMPARABLE", json_pack("{s:s}", "why", p->opt->why), e);
 }
 
 /* With the margins of the suite. */
-static bool compare(const struct approve_options *opt, const struct suite_scene *scene,
-                    const struct suite_reference *ref, const struct moments *candidate,
-                    const struct moments *stored, struct comparison *out, struct err *e)
+static bool compare(const struct pair *p, struct comparison *out, struct err *e)
 {
-    const struct compare_options co = {.alpha = opt->alpha,
-                                       .margin_global = ref->margin_global,
-                                       .margin_tile = ref->margin_tile,
-                                       .tile = scene->tile};
-    return compare_moments(candidate, stored, &co, out, e);
+    const struct compare_options co = {.alpha = p->opt->alpha,
+                                       .margin_global = p->ref->margin_global,
+                                       .margin_tile = p->ref->margin_tile,
+                                       .tile = p->scene->tile};
+    return compare_moments(&p->candidate.m, &p->stored.m, &co, out, e);
 }
 
-static enum approval approve_compared(const struct approve_options *opt,
-                                      const struct suite_scene *scene,
-                                      const struct suite_reference *ref,
-                                      const struct golden *candidate, const struct golden *stored,
-                                      FILE *out, struct err *e)
+static enum approval approve_compared(const struct pair *p, struct err *e)
 {
     struct comparison r;
-    if (!compare(opt, scene, ref, &candidate->m, &stored->m, &r, e)) {
-        err_prefix(e, "%s/%s: candidate (A) against stored (B)", scene->name, ref->engine);
+    if (!compare(p, &r, e)) {
+        err_prefix(e, "%s/%s: candidate (A) against stored (B)", p->scene->name, p->ref->engine);
         return APPROVE_IMPOSSIBLE;
     }
     const struct region *g = &r.global[3];
     char image[32], tile[32], more[128];
-    fprintf(out, "  %s: %s\n", verdict_name(r.verdict), r.reason);
-    fprintf(out,
+    fprintf(p->out, "  %s: %s\n", verdict_name(r.verdict), r.reason);
+    fprintf(p->out,
             "  difference %+.4f %% [%+.4f, %+.4f], smallest detectable: image %s, tile %s; margins "
             "%g %%, %g %%\n",
             100 * g->difference, 100 * g->ci_lo, 100 * g->ci_hi,
             region_mdb_text(r.mdb_global, image), region_mdb_text(r.mdb_tile, tile),
-            100 * ref->margin_global, 100 * ref->margin_tile);
+            100 * p->ref->margin_global, 100 * p->ref->margin_tile);
     enum approval done;
     if (!verdict_decides(r.verdict)) {
         verdict_more_samples(r.extra_factor, "replicates", more);
-        fprintf(out, "  refused: %s\n", more);
+        fprintf(p->out, "  refused: %s\n", more);
         done = APPROVE_INCONCLUSIVE;
-    } else if (r.verdict == VERDICT_DIFFERENT && opt->why == NULL) {
-        fprintf(out, "  refused: give --accept-difference \"why\"\n");
-        done = APPROVE_DIFFERENT;
+    } else if (r.verdict == VERDICT_DIFFERENT && p->opt->why == NULL) {
+        done = refuse_difference(p);
     } else {
-        json_t *change = effect_json(&r, opt->alpha);
-        if (r.verdict == VERDICT_DIFFERENT && change != NULL)
-            json_object_set_new(change, "why", json_string(opt->why));
-        done = stored_or_not(
-            store(opt, scene, ref, candidate, stored, verdict_name(r.verdict), change, e), out);
+        json_t *change = effect_json(&r, p->opt->alpha);
+        if (r.verdict == VERDICT_DIFFERENT)
+            json_object_set_new(change, "why", json_string(p->opt->why));
+        done = accept(p, verdict_name(r.verdict), change, e);
     }
     comparison_free(&r);
     return done;
 }
 
-static enum approval approve_new(const struct approve_options *opt, const struct suite_scene *scene,
-                                 const struct suite_reference *ref, const struct golden *candidate,
-                                 FILE *out, struct err *e)
+static enum approval approve_new(const struct pair *p, struct err *e)
 {
-    fprintf(out, "  NEW: nothing is stored\n");
-    if (!opt->accept_new) {
-        err_set(e, "%s/%s: nothing is stored: approve it with --new", scene->name, ref->engine);
-        return APPROVE_IMPOSSIBLE;
-    }
-    const struct golden none = {.state = GOLDEN_MISSING};
-    return stored_or_not(store(opt, scene, ref, candidate, &none, "NEW", json_object(), e), out);
+    fprintf(p->out, "  NEW: nothing is stored\n");
+    if (p->opt->accept_new)
+        return accept(p, "NEW", json_object(), e);
+    err_set(e, "%s/%s: nothing is stored: approve it with --new", p->scene->name, p->ref->engine);
+    return APPROVE_IMPOSSIBLE;
 }
 
 enum approval approve(const struct approve_options *opt, const struct suite_scene *scene,
                       const struct suite_reference *ref, FILE *out, struct err *e)
 {
-    struct golden candidate, stored;
     enum approval done = APPROVE_IMPOSSIBLE;
     if (!golden_settle(opt->golden_dir, scene->name, ref->engine, e))
         return done;
-    golden_inspect(opt->from_dir, scene, ref, &candidate);
-    golden_inspect(opt->golden_dir, scene, ref, &stored);
+    struct pair p = pair_open(opt, scene, ref, out);
+    const struct golden *candidate = &p.candidate, *stored = &p.stored;
     fprintf(out, "%s/%s\n", scene->name, ref->engine);
-    if (candidate.state == GOLDEN_MISSING) {
+    if (candidate->state == GOLDEN_MISSING) {
         err_set(e, "%s/%s: no candidate in %s: `assay golden render` makes it", scene->name,
                 ref->engine, opt->from_dir);
-    } else if (candidate.state != GOLDEN_CURRENT) {
-        *e = candidate.why;
-        err_prefix(e, "%s candidate", golden_state_name(candidate.state));
-    } else if (stored.state == GOLDEN_DAMAGED) {
-        *e = stored.why;
+    } else if (candidate->state != GOLDEN_CURRENT) {
+        *e = candidate->why;
+        err_prefix(e, "%s candidate", golden_state_name(candidate->state));
+    } else if (stored->state == GOLDEN_DAMAGED) {
+        *e = stored->why;
         err_prefix(e, "nothing to compare with: restore it, or remove it and give --new");
     } else {
-        if (stored.manifest != NULL)
-            print_provenance(out, "stored", stored.manifest);
-        print_provenance(out, "candidate", candidate.manifest);
-        if (stored.state == GOLDEN_MISSING)
-            done = approve_new(opt, scene, ref, &candidate, out, e);
-        else if (same_moments(&stored.m, &candidate.m))
-            done = approve_identical(opt, scene, ref, &candidate, &stored, out, e);
-        else if (stored.m.width != candidate.m.width || stored.m.height != candidate.m.height)
-            done = approve_incomparable(opt, scene, ref, &candidate, &stored, out, e);
+        if (stored->manifest != NULL)
+            print_provenance(out, "stored", stored->manifest);
+        print_provenance(out, "candidate", candidate->manifest);
+        if (stored->state == GOLDEN_MISSING)
+            done = approve_new(&p, e);
+        else if (same_moments(&stored->m, &candidate->m))
+            done = approve_identical(&p, e);
+        else if (stored->m.width != candidate->m.width || stored->m.height != candidate->m.height)
+            done = approve_incomparable(&p, e);
         else
-            done = approve_compared(opt, scene, ref, &candidate, &stored, out, e);
+            done = approve_compared(&p, e);
     }
-    golden_free(&candidate);
-    golden_free(&stored);
+    pair_close(&p);
     return done;
 }
 
@@ -234,13 +226,12 @@ bool approve_compare(const struct approve_options *opt, const struct suite_scene
                      const struct suite_reference *ref, FILE *out, enum verdict *verdict,
                      struct err *e)
 {
-    struct golden candidate, stored;
+    struct pair p = pair_open(opt, scene, ref, out);
     struct comparison r = {0};
-    golden_inspect(opt->from_dir, scene, ref, &candidate);
-    golden_inspect(opt->golden_dir, scene, ref, &stored);
-    bool ok = can_compare(&candidate, opt->from_dir, e) && can_compare(&stored, opt->golden_dir, e);
-    bool same = ok && same_moments(&candidate.m, &stored.m);
-    ok = ok && (same || compare(opt, scene, ref, &candidate.m, &stored.m, &r, e));
+    bool ok =
+        can_compare(&p.candidate, opt->from_dir, e) && can_compare(&p.stored, opt->golden_dir, e);
+    bool same = ok && same_moments(&p.candidate.m, &p.stored.m);
+    ok = ok && (same || compare(&p, &r, e));
     if (ok) {
         const struct region *g = &r.global[3];
         char effect[64] = "the same bits";
@@ -249,12 +240,10 @@ bool approve_compare(const struct approve_options *opt, const struct suite_scene
                      100 * g->ci_lo, 100 * g->ci_hi);
         *verdict = same ? VERDICT_EQUIVALENT : r.verdict;
         fprintf(out, "%-20s  %-26.26s  %-26.26s  %-26s  %8g  %s\n", scene->name,
-                text_of(candidate.manifest, "version"), text_of(stored.manifest, "version"), effect,
-                100 * ref->margin_global, verdict_name(*verdict));
-        if (!same)
-            comparison_free(&r);
+                text_of(p.candidate.manifest, "version"), text_of(p.stored.manifest, "version"),
+                effect, 100 * ref->margin_global, verdict_name(*verdict));
     }
-    golden_free(&candidate);
-    golden_free(&stored);
+    comparison_free(&r);
+    pair_close(&p);
     return ok || err_prefix(e, "%s/%s", scene->name, ref->engine);
 }

@@ -106,16 +106,13 @@ static bool render_ours(const struct reference_command *c, const struct suite_sc
 }
 
 /* Adds where it comes from; made: see the header. */
-static bool describe(json_t *entry, const struct suite_scene *s, const char *version,
+static void describe(json_t *entry, const struct suite_scene *s, const char *version,
                      const char *made, uint32_t seed, int shrink)
 {
-    json_t *more =
-        json_pack("{ss,ss,ss,si,si,si,si,sI,si}", "version", version, "made", made, "scene_sha256",
-                  s->sha256, "width", s->width, "height", s->height, "depth", s->depth, "tile",
-                  s->tile, "seed", (json_int_t)seed, "shrink", shrink);
-    bool ok = more != NULL && entry != NULL && json_object_update(entry, more) == 0;
-    json_decref(more);
-    return ok;
+    json_object_update_new(
+        entry, json_pack("{ss,ss,ss,si,si,si,si,sI,si}", "version", version, "made", made,
+                         "scene_sha256", s->sha256, "width", s->width, "height", s->height, "depth",
+                         s->depth, "tile", s->tile, "seed", (json_int_t)seed, "shrink", shrink));
 }
 
 static bool render_one(const struct reference_command *c, const struct suite_scene *scene,
@@ -133,12 +130,11 @@ static bool render_one(const struct reference_command *c, const struct suite_sce
     bool ok = is_ours ? render_ours(c, scene, engine, pathtracer, &unit, &l, e)
                       : render_reference(c, scene, engine, &unit, shrink, &l, &version, e);
     *entry = ok ? noise_ladder_json(&l) : NULL;
-    ok = ok && (describe(*entry, scene,
-                         is_ours           ? assay_version
-                         : version != NULL ? version
-                                           : "?",
-                         made, c->opt.seed, shrink) ||
-                err_set(e, "out of memory"));
+    describe(*entry, scene,
+             is_ours           ? assay_version
+             : version != NULL ? version
+                               : "?",
+             made, c->opt.seed, shrink);
     convergence_rate_reference_free(&unit);
     noise_ladder_free(&l);
     free(version);
@@ -178,9 +174,8 @@ bool noise_record_render(const struct reference_command *c, const struct suite_s
         fprintf(stderr, "%s: the noise of %s\n", scene->name, engine);
         json_t *entry = NULL, *all = noise_ladder_load(c->out, scene->name, e);
         bool ok = all != NULL && render_one(c, scene, engine, pathtracer, made, &entry, e) &&
-                  (json_object_set(all, engine, entry) == 0 || err_set(e, "out of memory")) &&
+                  json_object_set_new(all, engine, entry) == 0 &&
                   noise_ladder_store(c->out, scene->name, all, e);
-        json_decref(entry);
         json_decref(all);
         if (!ok)
             return err_prefix(e, "%s, %s", scene->name, engine);
@@ -251,19 +246,14 @@ static bool put(const struct approve_options *opt, const struct suite_scene *sce
     const json_t *was = json_object_get(all, engine);
     json_t *old = json_object_get(was, "changes"), *mine = json_copy((json_t *)entry);
     json_t *changes = old != NULL ? json_copy(old) : json_array();
-    bool ok = mine != NULL && changes != NULL && change != NULL &&
-              json_object_set_new(change, "date", json_string(utc_date_now().s)) == 0;
-    if (ok && was != NULL)
-        ok = json_object_set(change, "was", json_object_get(was, "version")) == 0;
-    if (ok && opt->why != NULL)
-        ok = json_object_set_new(change, "why", json_string(opt->why)) == 0;
-    ok = ok && json_array_append(changes, change) == 0 &&
-         json_object_set(mine, "changes", changes) == 0 && json_object_set(all, engine, mine) == 0;
-    ok =
-        ok ? noise_ladder_store(opt->golden_dir, scene->name, all, e) : err_set(e, "out of memory");
-    json_decref(changes);
-    json_decref(mine);
-    return ok;
+    json_object_set_new(change, "date", json_string(utc_date_now().s));
+    json_object_set(change, "was", json_object_get(was, "version"));
+    if (opt->why != NULL)
+        json_object_set_new(change, "why", json_string(opt->why));
+    json_array_append(changes, change);
+    json_object_set_new(mine, "changes", changes);
+    json_object_set_new(all, engine, mine);
+    return noise_ladder_store(opt->golden_dir, scene->name, all, e);
 }
 
 /* But for the record of how they came to be stored, which a candidate has where it was itself stored somewhere. */

@@ -10,7 +10,7 @@ enum { REFERENCE_MOST_SCENES = 64 };
 
 struct reference_command {
     const char *only[REFERENCE_MOST_SCENES], *engine, *out, *golden, *suite_dir, *work;
-    const char *as; /* with --engine FILE: the reference that it makes */
+    const char *as;          /* with --engine FILE: the reference that it makes */
     struct engine described; /* of --engine FILE; its name is empty where there is none */
     int num_only;
     struct reference_options opt;

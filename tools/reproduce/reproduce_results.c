@@ -192,11 +192,10 @@ bool reproduce_results(const char *path, const struct reproduce_options *opt, co
                        struct reproduced *out, struct err *e)
 {
     char product[MAX_PATH];
-    json_error_t je;
     int num = 0;
-    json_t *now = NULL, *then = json_read(path, JSON_REJECT_DUPLICATES, &je);
+    json_t *now = NULL, *then = json_read_or_say(path, e);
     if (then == NULL)
-        return err_set(e, "%s:%d: %s", path, je.line, je.text);
+        return false;
     const char *command = member_text(then, "command"), *version = member_text(then, "version");
     char **word = NULL;
     bool ok = command != NULL || err_set(e, "%s: does not say by what command it was made", path);
@@ -207,8 +206,8 @@ bool reproduce_results(const char *path, const struct reproduce_options *opt, co
     if (ok && (word = shell_quote_split(command, &num, e)) == NULL)
         ok = err_prefix(e, "%s", path);
     ok = ok && run_again(path, opt, then, num, word, dir, product, out, e);
-    if (ok && (now = json_read(product, 0, &je)) == NULL)
-        ok = err_set(e, "%s: made again: %s:%d: %s", path, product, je.line, je.text);
+    if (ok && (now = json_read_or_say(product, e)) == NULL)
+        ok = err_prefix(e, "%s: made again", path);
     if (ok && results_lack_time(now))
         ok = err_set(e, "%s: made again: its --budget was over before all was decided", path);
     if (ok) {

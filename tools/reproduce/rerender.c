@@ -51,32 +51,49 @@ static bool check_scene(const char *path, const struct image *im, const char *sc
                     path, scene, then, now));
 }
 
-/* The words of the render, as they are to be run; argv: room for as many as `word` has and MORE_WORDS more. Ours come
- * first, as "--" may end the options. spp: room for a number, to live as long. */
-static bool command_of(const char *path, const struct image *im,
-                       const struct reproduce_options *opt, char **word, int num,
-                       const char *threads, const char *out, char spp[NUMBER], const char **argv,
-                       struct err *e)
+/* A render that is made again, into the file `to`, by the words of its command. */
+struct remaking {
+    const char *path, *to;
+    const struct reproduce_options *opt;
+    struct reproduced *out;
+    int depth; /* of merges of merges */
+    struct image im;
+    char **word;
+    int num;
+    char threads[NUMBER], spp[NUMBER];
+};
+
+/* The words of the render, as they are to be run; argv: room for as many as r->word has and MORE_WORDS more. Ours come
+ * first, as "--" may end the options. */
+static bool command_of(struct remaking *r, const char **argv, struct err *e)
 {
     struct options o;
     struct err why = {""};
-    if (!options_parse(num, word, &o, &why) || o.action != ACTION_RENDER)
-        return err_set(e, "%s: its command is none of this program: %s", path, why.msg);
-    if (!check_scene(path, im, opt->scene != NULL ? opt->scene : o.scene, e))
+    const char *scene = r->opt->scene;
+    if (!options_parse(r->num, r->word, &o, &why) || o.action != ACTION_RENDER)
+        return err_set(e, "%s: its command is none of this program: %s", r->path, why.msg);
+    if (!check_scene(r->path, &r->im, scene != NULL ? scene : o.scene, e))
         return false;
-    const char *ours[] = {opt->pathtracer,           "-q", "-t", threads, "--samples",
-                          attr(im, "assay:samples"), "-f", out};
+    snprintf(r->threads, sizeof r->threads, "%d", r->opt->threads);
+    const char *ours[] = {r->opt->pathtracer,
+                          "-q",
+                          "-t",
+                          r->threads,
+                          "--samples",
+                          attr(&r->im, "assay:samples"),
+                          "-f",
+                          r->to};
     int n = (int)(sizeof ours / sizeof *ours);
     memcpy(argv, ours, sizeof ours);
     /* Where it was the default, the most that a pilot grants would now be the last of the samples. */
     if (o.pilot_tolerance >= 0) {
-        snprintf(spp, NUMBER, "%d", o.spp);
+        snprintf(r->spp, sizeof r->spp, "%d", o.spp);
         argv[n++] = "-s";
-        argv[n++] = spp;
+        argv[n++] = r->spp;
     }
-    int kept = cli_rewrite_kept(cli_rewrite_render, num - 1, word + 1, word + 1);
+    int kept = cli_rewrite_kept(cli_rewrite_render, r->num - 1, r->word + 1, r->word + 1);
     for (int i = 1; i <= kept; i++)
-        argv[n++] = word[i] == o.scene && opt->scene != NULL ? opt->scene : word[i];
+        argv[n++] = r->word[i] == o.scene && scene != NULL ? scene : r->word[i];
     return true;
 }
 
@@ -120,51 +137,42 @@ static bool compare(const char *path, const struct image *a, const struct image 
     return true;
 }
 
-/* Into the file `to`, by the words of a command. */
-static bool remake_render(const char *path, const struct image *im, char **word, int num,
-                          const struct reproduce_options *opt, const char *to,
-                          struct reproduced *out, struct err *e)
+static bool remake_render(struct remaking *r, struct err *e)
 {
-    char threads[NUMBER], spp[NUMBER];
-    snprintf(threads, sizeof threads, "%d", opt->threads);
-    const struct path log = fs_path("%s.log", to);
-    const char **argv = calloc((size_t)num + MORE_WORDS, sizeof *argv);
-    bool ok = (argv != NULL || err_set(e, "out of memory")) &&
-              command_of(path, im, opt, word, num, threads, to, spp, argv, e);
-    ok = ok && reproduced_command(out, argv, e);
+    const struct path log = fs_path("%s.log", r->to);
+    const char **argv = calloc((size_t)r->num + MORE_WORDS, sizeof *argv);
+    bool ok = (argv != NULL || err_set(e, "out of memory")) && command_of(r, argv, e);
+    ok = ok && reproduced_command(r->out, argv, e);
     const struct process p = {.argv = argv, .log = log.s};
-    ok = ok && (process_run(&p, NULL, e) || err_prefix(e, "%s: made again", path));
+    ok = ok && (process_run(&p, NULL, e) || err_prefix(e, "%s: made again", r->path));
     free(argv);
     return ok;
 }
 
 /* The same of sums of sample ranges: their jobs, run here one after the other and added up as they were. */
-static bool remake_ranges(const char *path, const struct image *im, char **word, int num,
-                          const struct reproduce_options *opt, const char *to,
-                          struct reproduced *out, struct err *e)
+static bool remake_ranges(struct remaking *r, struct err *e)
 {
     enum { BEFORE = 6 }; /* words that plan it */
-    char threads[NUMBER], spp[NUMBER], ranges[NUMBER];
+    char ranges[NUMBER];
     struct plan p = {.dir = ""};
-    struct plan_wishes w = {.parts = 1, .ranges = 1, .pathtracer = opt->pathtracer};
-    for (const char *c = attr(im, "assay:ranges"); *c != '\0'; c++)
+    struct plan_wishes w = {.parts = 1, .ranges = 1, .pathtracer = r->opt->pathtracer};
+    for (const char *c = attr(&r->im, "assay:ranges"); *c != '\0'; c++)
         w.ranges += *c == ',';
-    snprintf(threads, sizeof threads, "%d", opt->threads);
     snprintf(ranges, sizeof ranges, "%d", w.ranges);
-    const struct path dir = fs_path("%s.plan", to);
-    const char **argv = calloc((size_t)num + BEFORE + MORE_WORDS, sizeof *argv);
+    const struct path dir = fs_path("%s.plan", r->to);
+    const char **argv = calloc((size_t)r->num + BEFORE + MORE_WORDS, sizeof *argv);
     if (argv == NULL)
         return err_set(e, "out of memory");
     const char *plan[BEFORE] = {"assay", "plan", "--parts", "1", "--ranges", ranges};
     memcpy(argv, plan, sizeof plan);
     const char **render = argv + BEFORE;
-    bool ok = command_of(path, im, opt, word, num, threads, to, spp, render, e);
+    bool ok = command_of(r, render, e);
     render[0] = "pathtracer";
     char **words = (char **)render;
     int count = 0;
     while (render[count] != NULL)
         count++;
-    ok = ok && reproduced_command(out, argv, e) && plan_make(dir.s, count, words, &w, &p, e);
+    ok = ok && reproduced_command(r->out, argv, e) && plan_make(dir.s, count, words, &w, &p, e);
     for (int k = 0; ok && k < p.num; k++) {
         bool made;
         ok = job_run(&p, k, &made, e);
@@ -172,62 +180,63 @@ static bool remake_ranges(const char *path, const struct image *im, char **word,
     ok = ok && job_render_gather_quietly(&p, count, words, e);
     plan_free(&p);
     free(argv);
-    return ok || err_prefix(e, "%s: made again", path);
+    return ok || err_prefix(e, "%s: made again", r->path);
 }
 
-static bool remake(const char *path, const struct reproduce_options *opt, const char *to, int depth,
-                   struct reproduced *out, struct err *e);
+static bool remake(struct remaking r, struct err *e);
 
 /* Shares are made again each and then put together; their paths are those of the command. */
-static bool remake_merge(const char *path, char **word, int num,
-                         const struct reproduce_options *opt, const char *to, int depth,
-                         struct reproduced *out, struct err *e)
+static bool remake_merge(const struct remaking *r, struct err *e)
 {
-    int shares = num - 3, read = 0;
+    int shares = r->num - 3, read = 0;
     struct share whole = {0}, *share = calloc((size_t)(shares > 0 ? shares : 1), sizeof *share);
     bool ok = share != NULL || err_set(e, "out of memory");
     if (ok && shares < 2)
-        ok = err_set(e, "%s: its command names no shares", path);
+        ok = err_set(e, "%s: its command names no shares", r->path);
     for (int i = 0; ok && i < shares; i++) {
-        const struct path part = fs_path("%s.%d.exr", to, i);
-        ok = access(word[3 + i], R_OK) == 0 ||
-             err_set(e, "%s: its share '%s' is not here: go where it was made", path, word[3 + i]);
-        ok = ok && remake(word[3 + i], opt, part.s, depth + 1, out, e) &&
+        const struct path part = fs_path("%s.%d.exr", r->to, i);
+        const char *path = r->word[3 + i];
+        ok = access(path, R_OK) == 0 ||
+             err_set(e, "%s: its share '%s' is not here: go where it was made", r->path, path);
+        ok = ok &&
+             remake((struct remaking){.path = path,
+                                      .to = part.s,
+                                      .opt = r->opt,
+                                      .out = r->out,
+                                      .depth = r->depth + 1},
+                    e) &&
              share_read(part.s, &share[i], e);
         read += ok;
     }
-    ok = ok && merge_shares(share, shares, &whole, e) && share_write(to, &whole, "assay merge", e);
+    ok = ok && merge_shares(share, shares, &whole, e) &&
+         share_write(r->to, &whole, "assay merge", e);
     for (int i = 0; i < read; i++)
         share_free(&share[i]);
     free(share);
     share_free(&whole);
-    return ok && reproduced_command(out, (const char *const *)word, e);
+    return ok && reproduced_command(r->out, (const char *const *)r->word, e);
 }
 
-/* Into the file `to`. */
-static bool remake(const char *path, const struct reproduce_options *opt, const char *to, int depth,
-                   struct reproduced *out, struct err *e)
+/* r: without image and words. */
+static bool remake(struct remaking r, struct err *e)
 {
     enum { MOST_DEPTH = 16 };
-    struct image im = {0};
-    int num = 0;
-    if (depth > MOST_DEPTH)
-        return err_set(e, "%s: merged from itself", path);
-    if (!image_read_exr(path, &im, NULL, e))
+    if (r.depth > MOST_DEPTH)
+        return err_set(e, "%s: merged from itself", r.path);
+    if (!image_read_exr(r.path, &r.im, NULL, e))
         return false;
-    const char *command = image_get_attr(&im, "assay:command");
-    char **word = NULL;
-    bool ok = command != NULL || err_set(e, "%s: does not say by what command it was made", path);
-    if (ok && (word = shell_quote_split(command, &num, e)) == NULL)
-        ok = err_prefix(e, "%s", path);
-    if (ok && num >= 2 && strcmp(word[0], "assay") == 0 && strcmp(word[1], "merge") == 0)
-        ok = remake_merge(path, word, num, opt, to, depth, out, e);
-    else if (ok && image_get_attr(&im, "assay:ranges") != NULL)
-        ok = remake_ranges(path, &im, word, num, opt, to, out, e);
+    const char *command = image_get_attr(&r.im, "assay:command");
+    bool ok = command != NULL || err_set(e, "%s: does not say by what command it was made", r.path);
+    if (ok && (r.word = shell_quote_split(command, &r.num, e)) == NULL)
+        ok = err_prefix(e, "%s", r.path);
+    if (ok && r.num >= 2 && strcmp(r.word[0], "assay") == 0 && strcmp(r.word[1], "merge") == 0)
+        ok = remake_merge(&r, e);
+    else if (ok && image_get_attr(&r.im, "assay:ranges") != NULL)
+        ok = remake_ranges(&r, e);
     else if (ok)
-        ok = remake_render(path, &im, word, num, opt, to, out, e);
-    free(word);
-    image_free(&im);
+        ok = remake_render(&r, e);
+    free(r.word);
+    image_free(&r.im);
     return ok;
 }
 
@@ -246,14 +255,6 @@ static bool directory_of(const char *path, const char *scene, const char *engine
     if (dir[0] == '\0')
         strcpy(dir, ".");
     return true;
-}
-
-static const struct suite_reference *reference_of(const struct suite_scene *s, const char *engine)
-{
-    for (int i = 0; i < s->num_references; i++)
-        if (strcmp(s->reference[i].engine, engine) == 0)
-            return &s->reference[i];
-    return NULL;
 }
 
 /* By which engine it was made then, where it is another one now: that may be why it differs. */
@@ -318,7 +319,7 @@ static bool remake_golden(const char *path, const struct image *im,
     if (!directory_of(path, name, engine, golden_dir, e) || !suite_load(from, &suite, e))
         return false;
     const struct suite_scene *scene = suite_find(&suite, name);
-    const struct suite_reference *ref = scene != NULL ? reference_of(scene, engine) : NULL;
+    const struct suite_reference *ref = scene != NULL ? suite_reference_of(scene, engine) : NULL;
     bool ok = ref != NULL || err_set(e, "%s: %s has no scene '%.100s' with a reference by '%.100s'",
                                      path, from, name, engine);
     ok = ok && render_golden(scene, ref, opt, golden_dir, dir, to, out, e);
@@ -340,8 +341,9 @@ bool rerender(const char *path, const struct reproduce_options *opt, const char 
     bool golden = image_get_attr(&then, "assay:engine") != NULL;
     if (!golden)
         snprintf(out->made_by, sizeof out->made_by, "%s", attr(&then, "assay:version"));
-    bool ok = golden ? remake_golden(path, &then, opt, dir, to.s, out, e)
-                     : remake(path, &with, to.s, 0, out, e);
+    bool ok =
+        golden ? remake_golden(path, &then, opt, dir, to.s, out, e)
+               : remake((struct remaking){.path = path, .to = to.s, .opt = &with, .out = out}, e);
     ok = ok && image_read_exr(to.s, &now, NULL, e) && check_same(path, &then, &now, e) &&
          compare(path, &then, &now, out, e);
     if (ok && opt->keep != NULL)

@@ -203,37 +203,14 @@ static bool render_engine(const struct validation *v, const struct side *s, int 
     return fs_make_parent_dirs(path.s, e) && json_write(path.s, out->manifest, e);
 }
 
-static bool copy(const struct moments *m, struct moments *out, struct err *e)
-{
-    size_t pixels = (size_t)m->width * (size_t)m->height;
-    if (!moments_alloc(out, m->width, m->height, e))
-        return false;
-    memcpy(out->unit, m->unit, sizeof out->unit);
-    out->spp = m->spp;
-    memcpy(out->n, m->n, pixels * sizeof *m->n);
-    memcpy(out->mean, m->mean, 3 * pixels * sizeof *m->mean);
-    memcpy(out->m2, m->m2, 3 * pixels * sizeof *m->m2);
-    memcpy(out->m3, m->m3, 3 * pixels * sizeof *m->m3);
-    return true;
-}
-
-static bool copy_observed(const struct side_image *o, struct side_image *out, struct err *e)
-{
-    if (!copy(&o->m, &out->m, e))
-        return false;
-    out->manifest = json_incref(o->manifest);
-    out->seconds = o->seconds;
-    out->rays = o->rays;
-    return true;
-}
-
-/* `more` becomes what was there before and it. The manifest is the first one's, with all seeds. */
+/* `more` becomes what was there before and it, or stays what was there where it has no image. The manifest is the first one's,
+ * with all seeds. */
 static bool add_before(const struct side_image *before, struct side_image *more, struct err *e)
 {
     struct moments sum;
-    if (!copy(&before->m, &sum, e))
+    if (!moments_copy(&before->m, &sum, e))
         return false;
-    if (!moments_merge(&sum, &more->m, e)) {
+    if (more->m.n != NULL && !moments_merge(&sum, &more->m, e)) {
         moments_free(&sum);
         return false;
     }
@@ -246,12 +223,10 @@ static bool add_before(const struct side_image *before, struct side_image *more,
     if (before->manifest == NULL)
         return true;
     json_t *manifest = json_deep_copy(before->manifest);
-    json_t *seeds = json_object_get(manifest, "seeds");
-    if (seeds != NULL)
-        json_array_extend(seeds, json_object_get(more->manifest, "seeds"));
+    json_array_extend(json_object_get(manifest, "seeds"), json_object_get(more->manifest, "seeds"));
     json_decref(more->manifest);
     more->manifest = manifest;
-    return manifest != NULL || err_set(e, "out of memory");
+    return true;
 }
 
 /* Stored by an engine with a description, which names its filter, or by one that has the box of one pixel. */
@@ -276,7 +251,7 @@ static bool make(struct validation *v, struct side *s, int stage, int look, stru
     const struct side_image *before = l >= 0 ? &s->at[stage][l] : NULL;
     /* An engine without noise has no more to say. */
     if (before != NULL && (first == side_count(s, look) || strcmp(before->m.unit, "exact") == 0))
-        return copy_observed(before, out, &s->e);
+        return add_before(before, out, &s->e);
     bool ok = false;
     switch (s->kind) {
     case SIDE_OURS: ok = render_ours(v, s, stage, look, first, out, &s->e); break;

@@ -29,8 +29,7 @@ void import_result_print(FILE *f, const json_t *reports)
     size_t agree = 0, i;
     long long triangles = 0;
     const json_t *report;
-    const char *absent =
-        json_string_value(json_object_get(json_array_get(reports, 0), "absent"));
+    const char *absent = json_string_value(json_object_get(json_array_get(reports, 0), "absent"));
     if (absent != NULL) {
         fprintf(f, "Blender's own importer against ours: not checked (%s)\n", absent);
         return;

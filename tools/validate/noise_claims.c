@@ -38,23 +38,13 @@ struct row {
     enum verdict slope_verdict;
 };
 
-static json_t *number(double v)
-{
-    return isfinite(v) ? json_real(v) : json_null();
-}
-
-static json_t *pair(double lo, double hi)
-{
-    return isfinite(lo) && isfinite(hi) ? json_pack("[f,f]", lo, hi) : json_null();
-}
-
 /* Of V: of its logarithm where it has one. */
 static json_t *variance_ci(struct estimate v, double alpha)
 {
     if (v.value <= variance_ladder_none)
         return json_null();
     struct interval i = estimate_interval(variance_ladder_log(v), alpha);
-    return i.hi - i.lo < 20 ? pair(exp(i.lo), exp(i.hi)) : json_null();
+    return i.hi - i.lo < 20 ? json_interval(exp(i.lo), exp(i.hi)) : json_null();
 }
 
 static int tile_of_most(const struct variance_map *m)
@@ -71,15 +61,15 @@ static json_t *tile_json(const struct row *r, int tile, json_t *more)
     int x = r->ladder->sample.tiles_x;
     json_t *j =
         json_pack("{si,si}", "x", tile % x * r->scene->tile, "y", tile / x * r->scene->tile);
-    json_object_update(j, more);
-    json_decref(more);
+    json_object_update_new(j, more);
     return j;
 }
 
 static json_t *claim_json(const struct variance_claim *c)
 {
-    return json_pack("{so,so,so,ss}", "ratio", number(c->ratio), "ratio_ci", pair(c->lo, c->hi),
-                     "margin", json_real(c->margin), "ratio_verdict", verdict_name(c->verdict));
+    return json_pack("{so,so,so,ss}", "ratio", json_finite(c->ratio), "ratio_ci",
+                     json_interval(c->lo, c->hi), "margin", json_real(c->margin), "ratio_verdict",
+                     verdict_name(c->verdict));
 }
 
 static void add_measured(json_t *j, const struct row *r)
@@ -93,26 +83,23 @@ static void add_measured(json_t *j, const struct row *r)
                               json_pack("{si,sf,so}", "spp", l->rung[i].spp, "variance",
                                         l->rung[i].variance.value, "variance_ci",
                                         variance_ci(l->rung[i].variance, r->alpha * other_share)));
-    json_object_set_new(j, "rungs", rungs);
-    json_object_set_new(j, "replicates", json_integer(l->replicates));
-    json_object_set_new(j, "observations", json_real(l->n));
-    json_object_set_new(j, "variance", json_real(l->sample.image.value));
-    json_object_set_new(j, "variance_ci", variance_ci(l->sample.image, r->alpha * image_share));
-    json_object_set_new(
-        j, "worst_tile",
-        tile_json(r, most,
-                  json_pack("{sf,so}", "variance", l->sample.tile[most].value, "variance_ci",
-                            variance_ci(l->sample.tile[most], r->alpha * tile_share))));
+    json_t *worst = json_pack("{sf,so}", "variance", l->sample.tile[most].value, "variance_ci",
+                              variance_ci(l->sample.tile[most], r->alpha * tile_share));
+    json_object_update_new(j, json_pack("{so,si,sf,sf,so,so}", "rungs", rungs, "replicates",
+                                        l->replicates, "observations", l->n, "variance",
+                                        l->sample.image.value, "variance_ci",
+                                        variance_ci(l->sample.image, r->alpha * image_share),
+                                        "worst_tile", tile_json(r, most, worst)));
     if (r->has_slope) {
         struct interval i = estimate_interval(r->slope, r->alpha * other_share);
-        json_object_set_new(j, "slope", json_real(r->slope.value));
-        json_object_set_new(j, "slope_ci", pair(i.lo, i.hi));
+        json_object_update_new(j, json_pack("{sf,so}", "slope", r->slope.value, "slope_ci",
+                                            json_interval(i.lo, i.hi)));
     }
     if (r->timed && noise_ladder_efficiency(l, &eff)) {
         struct interval i = estimate_interval(eff, r->alpha * other_share);
-        json_object_set_new(j, "efficiency", json_real(exp(eff.value)));
-        json_object_set_new(j, "efficiency_ci",
-                            i.hi - i.lo < 5 ? pair(exp(i.lo), exp(i.hi)) : json_null());
+        json_object_update_new(
+            j, json_pack("{sf,so}", "efficiency", exp(eff.value), "efficiency_ci",
+                         i.hi - i.lo < 5 ? json_interval(exp(i.lo), exp(i.hi)) : json_null()));
     }
 }
 
@@ -160,23 +147,18 @@ static json_t *judged_row(const struct row *r)
     json_t *j = json_pack("{ss,ss,sf,ss,sb,ss}", "scene", r->scene->name, "engine", r->engine,
                           "alpha", r->alpha, "verdict", verdict_name(v), "passed",
                           v == VERDICT_EQUIVALENT, "reason", reason);
-    if (j == NULL)
-        return NULL;
     add_measured(j, r);
     json_object_set_new(j, "seconds", json_real(r->ladder->cpu_s));
-    json_t *image = claim_json(&r->image), *stated = claim_json(&r->stated);
     json_object_set_new(j, "against", json_string(r->against));
-    json_object_update(j, image);
+    json_object_update_new(j, claim_json(&r->image));
     if (r->has_tiles)
         json_object_set_new(j, "tile_claim", tile_json(r, r->worst, claim_json(&r->tile)));
     if (r->has_stated)
-        json_object_set(j, "stated", stated);
-    if (r->slope_margin > 0) {
-        json_object_set_new(j, "slope_verdict", json_string(verdict_name(r->slope_verdict)));
-        json_object_set_new(j, "slope_margin", json_real(r->slope_margin));
-    }
-    json_decref(image);
-    json_decref(stated);
+        json_object_set_new(j, "stated", claim_json(&r->stated));
+    if (r->slope_margin > 0)
+        json_object_update_new(j,
+                               json_pack("{ss,sf}", "slope_verdict", verdict_name(r->slope_verdict),
+                                         "slope_margin", r->slope_margin));
     return j;
 }
 
@@ -381,7 +363,6 @@ static bool look(const struct noise_job *job, int replicates, struct noise_rende
             judge_independent(&run, has_form ? &form : &record->sample, record, has_form, &r);
         *decided = is_decided(&r);
         *row = judged_row(&r);
-        ok = *row != NULL || err_set(e, "out of memory");
     }
     noise_ladder_free(&run);
     variance_map_free(&form);
@@ -409,7 +390,8 @@ static bool judge_ours(const struct noise_job *job, const json_t *stored, double
         row = NULL;
         ok = look(job, replicates, &renders, &record, alpha / (looks + 1), &decided, &row, e);
     }
-    ok = ok && (json_array_append(rows, row) == 0 || err_set(e, "out of memory"));
+    if (ok)
+        json_array_append(rows, row);
     json_decref(row);
     noise_ladder_renders_free(&renders);
     noise_ladder_free(&record);
@@ -437,8 +419,7 @@ static json_t *stored_row(const struct suite_scene *s, const char *engine, const
     r.has_slope = noise_ladder_slope(&l, &r.slope);
     json_t *j = json_pack("{ss,ss,sf,ss,sb}", "scene", s->name, "engine", engine, "alpha", alpha,
                           "verdict", "MEASURED", "passed", 1);
-    if (j != NULL)
-        add_measured(j, &r);
+    add_measured(j, &r);
     noise_ladder_free(&l);
     return j;
 }

@@ -325,13 +325,12 @@ bool noise_ladder_is_kept(const char *golden_dir, const struct suite *suite)
 json_t *noise_ladder_load(const char *golden_dir, const char *scene, struct err *e)
 {
     const struct path path = place(golden_dir, scene);
-    json_error_t je;
     if (access(path.s, F_OK) != 0)
         return json_object();
-    json_t *all = json_read(path.s, JSON_REJECT_DUPLICATES, &je);
-    if (json_is_object(all))
+    json_t *all = json_read_or_say(path.s, e);
+    if (all == NULL || json_is_object(all))
         return all;
-    err_set(e, "%s:%d: %s", path.s, je.line, all == NULL ? je.text : "not a JSON object");
+    err_set(e, "%s: not a JSON object", path.s);
     json_decref(all);
     return NULL;
 }

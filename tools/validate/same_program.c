@@ -12,13 +12,11 @@
 #include <stdlib.h>
 #include <sys/stat.h>
 
-/* A directory's renders, or one image's, or one side's means. */
+/* `all`: those of a directory or in memory, one image's, or one side's means. */
 struct renders {
-    struct replicate_dir dir;
+    struct replicate_dir all, dir;
     struct image_file file;
     float *mean;
-    int num, width, height;
-    float **rgb;
 };
 
 static void renders_free(struct renders *r)
@@ -36,10 +34,7 @@ static bool renders_take(const struct moments *m, struct renders *r, struct err 
         return err_set(e, "out of memory for an image");
     for (size_t i = 0; i < values; i++)
         r->mean[i] = (float)moments_mean(m, i);
-    r->num = 1;
-    r->width = m->width;
-    r->height = m->height;
-    r->rgb = &r->mean;
+    r->all = (struct replicate_dir){1, m->width, m->height, .rgb = &r->mean};
     return true;
 }
 
@@ -50,28 +45,17 @@ static bool renders_read(const char *path, const struct input_memory *memory, st
     if (memory != NULL && memory->moments != NULL)
         return renders_take(memory->moments, r, e);
     if (memory != NULL) {
-        r->num = memory->renders.num;
-        r->width = memory->renders.width;
-        r->height = memory->renders.height;
-        r->rgb = memory->renders.rgb;
+        r->all = memory->renders;
         return true;
     }
     if (stat(path, &st) == 0 && S_ISDIR(st.st_mode)) {
-        if (!replicate_dir_read(path, &r->dir, e))
-            return false;
-        r->num = r->dir.num;
-        r->width = r->dir.width;
-        r->height = r->dir.height;
-        r->rgb = r->dir.rgb;
-        return true;
+        bool ok = replicate_dir_read(path, &r->dir, e);
+        r->all = r->dir;
+        return ok;
     }
-    if (!image_file_read(path, &r->file, e))
-        return false;
-    r->num = 1;
-    r->width = r->file.width;
-    r->height = r->file.height;
-    r->rgb = &r->file.rgb;
-    return true;
+    bool ok = image_file_read(path, &r->file, e);
+    r->all = (struct replicate_dir){1, r->file.width, r->file.height, .rgb = &r->file.rgb};
+    return ok;
 }
 
 /* Both must have been asked for the same: where each side has one number of samples in all pixels, that is it. */
@@ -106,22 +90,23 @@ bool same_program_judge(const char *const path[2], const struct input_memory *co
                         const struct moments *m, const struct sign_flip_options *opt,
                         struct sign_flip *out, struct err *e)
 {
-    struct renders r[2] = {{.num = 0}};
+    struct renders r[2] = {0};
     float *error = NULL;
     bool ok = true;
     for (int i = 0; ok && i < 2; i++)
         ok = m != NULL ? renders_take(&m[i], &r[i], e) : renders_read(path[i], memory[i], &r[i], e);
-    if (ok && (r[0].width != r[1].width || r[0].height != r[1].height))
-        ok = err_set(e, "A is %d x %d pixels, B is %d x %d", r[0].width, r[0].height, r[1].width,
-                     r[1].height);
-    if (ok && r[0].num != r[1].num)
-        ok = err_set(e, "A has %d renders, B %d: each of A is held against one of B", r[0].num,
-                     r[1].num);
+    const struct replicate_dir *a = &r[0].all, *b = &r[1].all;
+    if (ok && (a->width != b->width || a->height != b->height))
+        ok = err_set(e, "A is %d x %d pixels, B is %d x %d", a->width, a->height, b->width,
+                     b->height);
+    if (ok && a->num != b->num)
+        ok = err_set(e, "A has %d renders, B %d: each of A is held against one of B", a->num,
+                     b->num);
     if (ok && m != NULL) {
         error = stated_error(m);
         ok = error != NULL ? check_samples(m, e) : err_set(e, "out of memory for errors");
     }
-    struct sign_flip_images in = {r[0].num, r[0].width, r[0].height, r[0].rgb, r[1].rgb, error};
+    struct sign_flip_images in = {a->num, a->width, a->height, a->rgb, b->rgb, error};
     ok = ok && sign_flip_test(&in, opt, out, e);
     free(error);
     renders_free(&r[0]);
