@@ -1,5 +1,7 @@
 #include "bug_effect.h"
 
+#include "tests/tools/diagnose/catalogue_write.h"
+
 #include <dirent.h>
 #include <math.h>
 #include <stdio.h>

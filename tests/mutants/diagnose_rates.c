@@ -11,6 +11,7 @@
 #include "tools/diagnose/diagnose.h"
 #include "tools/diagnose/diagnose_render.h"
 #include "tools/validate/run_pathtracer.h"
+#include "tests/tools/diagnose/catalogue_write.h"
 #include "tests/support/simulate.h"
 #include "tests/studies/calibration/work.h"
 

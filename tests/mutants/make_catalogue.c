@@ -14,6 +14,7 @@
 #include "renderer/base/fs.h"
 #include "tools/diagnose/diagnose_render.h"
 #include "bug_effect.h"
+#include "tests/tools/diagnose/catalogue_write.h"
 #include "tests/studies/calibration/work.h"
 
 #include <math.h>

@@ -15,7 +15,7 @@
  *              variances to 5.
  *
  * A bug that is not in a view's "bugs" changes nothing there; one without "pixels" no cell's mean. Written by
- * tests/mutants/make_catalogue.c, which also says how; read by everybody else. */
+ * tests/tools/diagnose/catalogue_write.c for tests/mutants/make_catalogue.c, which also says how; read by everybody else. */
 #ifndef ASSAY_CATALOGUE_H
 #define ASSAY_CATALOGUE_H
 
@@ -61,9 +61,6 @@ struct catalogue {
 /* Fails, with a line, on a missing or damaged file. */
 bool catalogue_read(const char *dir, struct catalogue *out, struct err *e)
     __attribute__((warn_unused_result));
-/* manifest.json last, so that a catalogue is whole or not there. */
-bool catalogue_write(const char *dir, const struct catalogue *c, struct err *e)
-    __attribute__((warn_unused_result));
 void catalogue_free(struct catalogue *c);
 
 /* The scene and the variant (NULL: none) of a view. Fails if the suite has no such, or if the scene is not
@@ -79,14 +76,5 @@ int catalogue_bug(const struct catalogue *c, const char *name);
 bool catalogue_same_mistake(const struct bug *a, const struct bug *b);
 /* Its name without the variant. */
 void catalogue_mistake(const struct bug *b, char name[64]);
-
-/* The header lines and the hash of a patch; the bug's name is the file's. Fails if a line is missing. */
-bool catalogue_bug_of_patch(const char *path, struct bug *out, struct err *e)
-    __attribute__((warn_unused_result));
-
-/* Holds the catalogue against the patches of a directory, and of another (NULL: none): fails, naming the first, if one has no
- * entry, has changed since, or is gone. */
-bool catalogue_current(const struct catalogue *c, const char *patch_dir, const char *other_dir,
-                       struct err *e) __attribute__((warn_unused_result));
 
 #endif

@@ -15,6 +15,7 @@
 #include "renderer/base/fs.h"
 #include "tools/grade/rubric_bugs.h"
 #include "tests/mutants/bug_effect.h"
+#include "tests/tools/diagnose/catalogue_write.h"
 #include "tests/studies/calibration/work.h"
 
 #include <limits.h>

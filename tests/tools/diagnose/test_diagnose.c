@@ -3,6 +3,7 @@
  * correct renderer has at the view's number of samples. Real renders: tests/end_to_end/end_to_end.sh and make diagnose-rates. */
 #include "renderer/base/fs.h"
 #include "tools/diagnose/diagnose.h"
+#include "catalogue_write.h"
 #include "tests/support/simulate.h"
 #include "tests/support/test.h"
 

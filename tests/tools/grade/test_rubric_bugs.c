@@ -1,6 +1,7 @@
 /* Bugs named by 8-bit images alone, with the catalogue that ships, on images made of what it says. */
 
 #include "bug_images.h"
+#include "tests/tools/diagnose/catalogue_write.h"
 #include "tests/support/test.h"
 
 static struct bug_images of;
