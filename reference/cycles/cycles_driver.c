@@ -1,7 +1,7 @@
 /* Drives Blender: the dump, one Blender process for all replicates that are asked for, and the fold. */
-#define _GNU_SOURCE
 #include "cycles_driver.h"
 
+#include "blender.h"
 #include "export_cycles.h"
 #include "reference/replicates/independence.h"
 #include "reference/base/process.h"
@@ -16,17 +16,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Of replicates first .. last-1; NULL out of memory. */
+/* Of replicates first .. last-1. */
 static json_t *seeds_of(const struct reference_job *job, int first, int last)
 {
     json_t *seeds = json_array();
     for (int k = first; k < last; k++)
-        if (json_array_append_new(
-                seeds,
-                json_integer(replicate_seed(job->opt->seed, job->opt->first_replicate + k))) != 0) {
-            json_decref(seeds);
-            return NULL;
-        }
+        json_array_append_new(
+            seeds, json_integer(replicate_seed(job->opt->seed, job->opt->first_replicate + k)));
     return seeds;
 }
 
@@ -34,7 +30,7 @@ static bool write_seeds(const struct reference_job *job, int first, int last, st
 {
     const struct path path = fs_path("%s/seeds.json", job->dir);
     json_t *seeds = seeds_of(job, first, last);
-    bool ok = seeds != NULL ? json_write(path.s, seeds, e) : err_set(e, "out of memory");
+    bool ok = json_write(path.s, seeds, e);
     json_decref(seeds);
     return ok;
 }
@@ -52,11 +48,8 @@ static bool read_report(const char *log, json_t **report, struct err *e)
     while (*report == NULL && getline(&line, &size, f) > 0)
         if (strncmp(line, mark, sizeof mark - 1) == 0)
             *report = json_loads(line + sizeof mark - 1, 0, NULL);
-    bool no_memory = *report == NULL && !feof(f) && !ferror(f);
     free(line);
     fclose(f);
-    if (no_memory)
-        return err_set(e, "%s: out of memory", log);
     const char *version = json_string_value(json_object_get(*report, "version"));
     if (version != NULL && json_is_object(json_object_get(*report, "settings")))
         return true;
@@ -119,15 +112,10 @@ static bool fold(const struct reference_job *job, const struct replicate_images 
     static const char *const told[] = {"version", "settings", "binary_sha256", "command"};
     if (!fold_replicates(job, images, out, manifest, e))
         return false;
-    bool ok = true;
-    for (size_t i = 0; ok && i < sizeof told / sizeof *told; i++)
-        ok = json_object_set(manifest, told[i], json_object_get(said, told[i])) == 0;
-    ok = ok && json_object_set_new(manifest, "seeds", seeds_of(job, 0, job->ref->replicates)) == 0;
-    if (!ok) {
-        err_set(e, "Cycles manifest: out of memory");
-        moments_free(out);
-    }
-    return ok;
+    for (size_t i = 0; i < sizeof told / sizeof *told; i++)
+        json_object_set(manifest, told[i], json_object_get(said, told[i]));
+    json_object_set_new(manifest, "seeds", seeds_of(job, 0, job->ref->replicates));
+    return true;
 }
 
 static bool count(const struct reference_job *job, int *num, struct err *e)
@@ -135,70 +123,6 @@ static bool count(const struct reference_job *job, int *num, struct err *e)
     (void)e;
     *num = job->ref->replicates;
     return true;
-}
-
-/* Image first + i is replicate_<i>.exr, as cycles.py names it. */
-static bool render(const struct reference_job *job, int first, int last, json_t *said,
-                   struct err *e)
-{
-    char blender[4096], sha256[65];
-    char spp[16], threads[16], command[512] = "";
-    json_t *report = NULL;
-    char *script = NULL;
-    bool ok = false;
-    assert(last > first && job->ref->spp > 0 && job->opt->threads > 0);
-    if (!process_find("blender", blender, sizeof blender))
-        return err_set(e, "blender: no such program in PATH (Blender 3.4 with Cycles)");
-    const struct path relative = fs_path("%s/cycles/cycles.py", job->opt->share_dir);
-    script = realpath(relative.s, NULL);
-    if (script == NULL)
-        return err_set(e, "%s: %s", relative.s, strerror(errno));
-    const struct path dump = fs_path("%s/scene.json", job->dir);
-    const struct path log = fs_path("%s/blender.log", job->dir);
-    if (!sha256_file(blender, sha256, e) ||
-        !export_cycles(job->scene, job->camera, job->suite->depth, dump.s, e) ||
-        !write_seeds(job, first, last, e))
-        goto out;
-
-    snprintf(spp, sizeof spp, "%d", job->ref->spp);
-    snprintf(threads, sizeof threads, "%d", job->opt->threads);
-    const char *const argv[] = {"blender",
-                                "-b",
-                                "--factory-startup",
-                                "-noaudio",
-                                "--python-exit-code",
-                                "3",
-                                "-P",
-                                script,
-                                "--",
-                                "--scene",
-                                "scene.json",
-                                "--spp",
-                                spp,
-                                "--threads",
-                                threads,
-                                "--seeds",
-                                "seeds.json",
-                                NULL};
-    if (!process_run(
-            &(struct process){
-                .argv = argv, .cwd = job->dir, .log = log.s, .timeout_s = job->opt->timeout_s},
-            NULL, e) ||
-        !read_report(log.s, &report, e))
-        goto out;
-
-    for (int i = 0; argv[i] != NULL; i++)
-        snprintf(command + strlen(command), sizeof command - strlen(command), "%s%s",
-                 i > 0 ? " " : "", argv[i] == script ? "cycles.py" : argv[i]);
-    ok = (json_object_set(said, "version", json_object_get(report, "version")) == 0 &&
-          json_object_set(said, "settings", json_object_get(report, "settings")) == 0 &&
-          json_object_set_new(said, "binary_sha256", json_string(sha256)) == 0 &&
-          json_object_set_new(said, "command", json_string(command)) == 0) ||
-         err_set(e, "out of memory");
-out:
-    json_decref(report);
-    free(script);
-    return ok;
 }
 
 static bool write_key(const struct reference_job *job, const char *path, struct err *e)
@@ -213,6 +137,32 @@ static const char *const scripts[] = {"cycles/cycles.py",
                                       "cycles/cycles_material.py",
                                       "cycles/cycles_texture.py",
                                       NULL};
+
+/* Image first + i is replicate_<i>.exr, as cycles.py names it. */
+static bool render(const struct reference_job *job, int first, int last, json_t *said,
+                   struct err *e)
+{
+    char blender[4096], sha256[65], command[512];
+    json_t *report = NULL;
+    assert(last > first && job->ref->spp > 0 && job->opt->threads > 0);
+    if (!process_find("blender", blender, sizeof blender))
+        return err_set(e, "blender: no such program in PATH (Blender 3.4 with Cycles)");
+    snprintf(command, sizeof command,
+             BLENDER_RUN "cycles.py -- --scene scene.json --spp %d --threads %d --seeds seeds.json",
+             job->ref->spp, job->opt->threads);
+    if (!sha256_file(blender, sha256, e) ||
+        !write_key(job, fs_path("%s/scene.json", job->dir).s, e) ||
+        !write_seeds(job, first, last, e) ||
+        !blender_run(command, job->opt->share_dir, scripts[0], job->dir, job->opt->timeout_s, e) ||
+        !read_report(fs_path("%s/blender.log", job->dir).s, &report, e))
+        return false;
+    json_object_update_new(said,
+                           json_pack("{sO,sO,ss,ss}", "version", json_object_get(report, "version"),
+                                     "settings", json_object_get(report, "settings"),
+                                     "binary_sha256", sha256, "command", command));
+    json_decref(report);
+    return true;
+}
 
 const struct engine_driver cycles_driver = {.program = "blender",
                                             .scripts = scripts,

@@ -2,17 +2,14 @@
 
 #include <string.h>
 
-static json_t *numbers3(double x, double y, double z)
-{
-    return json_pack("[fff]", x, y, z);
-}
 json_t *cycles_vec3(vec3 v)
 {
-    return numbers3(v.x, v.y, v.z);
+    return json_pack("[fff]", (double)v.x, (double)v.y, (double)v.z);
 }
+
 json_t *cycles_rgb(rgb c)
 {
-    return numbers3(c.r, c.g, c.b);
+    return json_pack("[fff]", (double)c.r, (double)c.g, (double)c.b);
 }
 
 json_t *cycles_name(const char *name)
@@ -24,12 +21,4 @@ json_t *cycles_name(const char *name)
         ascii[i] = name[i] >= ' ' && name[i] <= '~' ? name[i] : '?';
     ascii[n] = '\0';
     return json_string(ascii);
-}
-
-void cycles_push(json_t **array, json_t *value)
-{
-    if (json_array_append_new(*array, value) == 0)
-        return;
-    json_decref(*array);
-    *array = NULL;
 }

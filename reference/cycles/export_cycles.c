@@ -3,6 +3,7 @@
 #include "export_cycles_internal.h"
 #include "reference/suite/features.h"
 #include "reference/base/json_file.h"
+#include "renderer/base/fs.h"
 
 #include <assert.h>
 #include <math.h>
@@ -73,39 +74,28 @@ bool export_cycles(const struct scene *s, const struct camera *c, int depth, con
 {
     assert(depth >= 0 && c->width > 0 && c->height > 0);
     double extent = d3_length(d3_sub(cycles_wide(s->bounds_max), cycles_wide(s->bounds_min)));
-    json_t *camera = NULL, *materials = NULL, *meshes = NULL, *environment = NULL, *root = NULL;
-    struct err why = {"out of memory"};
-    char image[4096 + 8];
+    json_t *camera = NULL, *materials = NULL, *meshes = NULL, *environment = NULL;
     bool image_written = false;
     uint32_t textures_written = 0;
     if (depth > MAX_DEPTH)
         return err_set(e, "Cycles: depth %d, at most %d are possible", depth, MAX_DEPTH);
-    if (strlen(path) >= sizeof image - 4)
-        return err_set(e, "%.64s...: path too long", path);
-    snprintf(image, sizeof image, "%s.exr", path);
-    bool ok =
-        check_filter(&c->filter, &why) && cycles_write_textures(s, path, &textures_written, &why) &&
-        (materials = cycles_materials(s, path, &why)) != NULL &&
-        (camera = camera_json(s, c, &why)) != NULL && (meshes = cycles_meshes(s, &why)) != NULL &&
-        (environment = cycles_environment(s, image, &image_written, &why)) != NULL;
-    if (ok) {
-        root = json_pack("{si,si,si,si,sf,sO,sO,sO,so,so,sO}", "assay_cycles", 2, "depth", depth,
-                         "width", c->width, "height", c->height, "extent", extent, "camera", camera,
-                         "materials", materials, "meshes", meshes, "spheres",
-                         cycles_spheres(s, c->eye), "lights", cycles_lights(s), "environment",
-                         environment);
-        if (c->filter.radius > 0)
-            json_object_set_new(root, "filter_width", json_real(4 * c->filter.sigma));
-        ok = root != NULL && json_write_as(path, root, JSON_COMPACT | JSON_REAL_PRECISION(9), &why);
-    }
+    const struct path image = fs_path("%s.exr", path);
+    bool ok = check_filter(&c->filter, e) && cycles_write_textures(s, path, &textures_written, e) &&
+              (materials = cycles_materials(s, path, e)) != NULL &&
+              (camera = camera_json(s, c, e)) != NULL && (meshes = cycles_meshes(s, e)) != NULL &&
+              (environment = cycles_environment(s, image.s, &image_written, e)) != NULL;
+    json_t *root =
+        json_pack("{si,si,si,si,sf,so?,so?,so?,so,so,so?}", "assay_cycles", 2, "depth", depth,
+                  "width", c->width, "height", c->height, "extent", extent, "camera", camera,
+                  "materials", materials, "meshes", meshes, "spheres", cycles_spheres(s, c->eye),
+                  "lights", cycles_lights(s), "environment", environment);
+    if (c->filter.radius > 0)
+        json_object_set_new(root, "filter_width", json_real(4 * c->filter.sigma));
+    ok = ok && json_write_as(path, root, JSON_COMPACT | JSON_REAL_PRECISION(9), e);
     if (!ok && image_written)
-        unlink(image);
+        unlink(image.s);
     if (!ok)
         cycles_remove_textures(path, textures_written);
     json_decref(root);
-    json_decref(camera);
-    json_decref(materials);
-    json_decref(meshes);
-    json_decref(environment);
-    return ok || err_set(e, "%s", why.msg);
+    return ok;
 }

@@ -2,6 +2,7 @@
 #ifndef ASSAY_EXPORT_CYCLES_INTERNAL_H
 #define ASSAY_EXPORT_CYCLES_INTERNAL_H
 
+#include "renderer/base/err.h"
 #include "renderer/math/mat4.h"
 #include "renderer/scene/scene.h"
 
@@ -22,8 +23,6 @@ json_t *cycles_vec3(vec3 v);
 json_t *cycles_rgb(rgb c);
 /* Names are only labels here; other bytes than ASCII's become '?'. */
 json_t *cycles_name(const char *name);
-/* json_array_append_new() that remembers a failure: *array is then NULL. */
-void cycles_push(json_t **array, json_t *value);
 
 /* Parts of the dump; NULL with a line in *e if the recipe cannot express them. */
 json_t *cycles_materials(const struct scene *s, const char *dump, struct err *e);
@@ -35,7 +34,7 @@ bool cycles_write_textures(const struct scene *s, const char *dump, uint32_t *wr
                            struct err *e);
 void cycles_remove_textures(const char *dump, uint32_t written);
 /* What the dump says of a map; its image has been written. */
-json_t *cycles_map(const struct scene *s, uint32_t map, const char *dump);
+json_t *cycles_map(const struct scene *s, uint32_t map, const char *dump, struct err *e);
 /* An image goes to image_path, by rename; *image_written tells if so. */
 json_t *cycles_environment(const struct scene *s, const char *image_path, bool *image_written,
                            struct err *e);

@@ -1,8 +1,8 @@
 #include "export_cycles_internal.h"
 
+#include "reference/replicates/replicate_images.h"
+#include "renderer/base/fs.h"
 #include "renderer/scene/environment.h"
-
-#include <string.h>
 
 static json_t *falling_off(const struct light *l, const char *kind)
 {
@@ -14,13 +14,8 @@ static json_t *falling_off(const struct light *l, const char *kind)
 static json_t *spot(const struct light *l)
 {
     json_t *o = falling_off(l, "spot");
-    json_t *cone = json_pack("{so,sf,sf}", "axis", cycles_vec3(l->axis), "cos_cutoff",
-                             (double)l->cos_cutoff, "exponent", (double)l->exponent);
-    if (json_object_update_missing(o, cone) != 0) {
-        json_decref(o);
-        o = NULL;
-    }
-    json_decref(cone);
+    json_object_update_new(o, json_pack("{so,sf,sf}", "axis", cycles_vec3(l->axis), "cos_cutoff",
+                                        (double)l->cos_cutoff, "exponent", (double)l->exponent));
     return o;
 }
 
@@ -30,12 +25,12 @@ json_t *cycles_lights(const struct scene *s)
     for (uint32_t i = 0; i < s->num_lights; i++) {
         const struct light *l = &s->lights[i];
         switch (l->kind) {
-        case LIGHT_POINT: cycles_push(&out, falling_off(l, "point")); break;
-        case LIGHT_SPOT: cycles_push(&out, spot(l)); break;
+        case LIGHT_POINT: json_array_append_new(out, falling_off(l, "point")); break;
+        case LIGHT_SPOT: json_array_append_new(out, spot(l)); break;
         case LIGHT_DIRECTIONAL:
-            cycles_push(&out,
-                        json_pack("{ss,so,so}", "kind", "directional", "to_light",
-                                  cycles_vec3(l->to_light), "irradiance", cycles_rgb(l->value)));
+            json_array_append_new(out, json_pack("{ss,so,so}", "kind", "directional", "to_light",
+                                                 cycles_vec3(l->to_light), "irradiance",
+                                                 cycles_rgb(l->value)));
             break;
         case LIGHT_ENVIRONMENT: /* a part of its own */
         case LIGHT_TRIANGLES:   /* by their material */
@@ -43,22 +38,6 @@ json_t *cycles_lights(const struct scene *s)
         }
     }
     return out;
-}
-
-static bool write_image(const struct environment_parts *p, const char *path, struct err *e)
-{
-    static const char *const NAMES[3] = {"R", "G", "B"};
-    struct image im;
-    if (!image_alloc(&im, (int)p->width, (int)p->height, 3, NAMES, e))
-        return false;
-    for (size_t i = 0; i < (size_t)p->width * p->height; i++) {
-        im.data[3 * i] = p->texel[i].r;
-        im.data[3 * i + 1] = p->texel[i].g;
-        im.data[3 * i + 2] = p->texel[i].b;
-    }
-    bool ok = image_write_exr(path, &im, e);
-    image_free(&im);
-    return ok;
 }
 
 json_t *cycles_environment(const struct scene *s, const char *image_path, bool *image_written,
@@ -74,9 +53,8 @@ json_t *cycles_environment(const struct scene *s, const char *image_path, bool *
         return json_pack("{ss,so}", "kind", "upper_half", "radiance", cycles_rgb(p.radiance));
     case ENVIRONMENT_IMAGE: break;
     }
-    *image_written = write_image(&p, image_path, e);
-    if (!*image_written)
-        return NULL;
-    const char *slash = strrchr(image_path, '/');
-    return json_pack("{ss,ss}", "kind", "image", "file", slash != NULL ? slash + 1 : image_path);
+    *image_written =
+        replicate_images_write(image_path, (int)p.width, (int)p.height, &p.texel->r, e);
+    return *image_written ? json_pack("{ss,ss}", "kind", "image", "file", fs_base(image_path))
+                          : NULL;
 }

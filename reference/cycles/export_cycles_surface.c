@@ -42,87 +42,67 @@ static const char *const KIND[NUM_MATERIAL_KINDS] = {
     [MATERIAL_REFRACTION] = "refraction", [MATERIAL_GLASS] = "glass",
     [MATERIAL_MICROFACET] = "microfacet", [MATERIAL_PLASTIC] = "plastic"};
 
-/* Adds the maps of a material that has some. */
-static json_t *with_maps(json_t *o, const struct scene *s, const struct material *m,
-                         const char *dump)
-{
-    bool ok =
-        o != NULL &&
-        (m->reflectance_map == 0 ||
-         json_object_set_new(o, "reflectance_map", cycles_map(s, m->reflectance_map, dump)) == 0) &&
-        (m->radiance_map == 0 ||
-         json_object_set_new(o, "radiance_map", cycles_map(s, m->radiance_map, dump)) == 0);
-    if (ok)
-        return o;
-    json_decref(o);
-    return NULL;
-}
-
-static json_t *reflection(const struct material *m)
+static json_t *material_json(const struct material *m)
 {
     json_t *o = json_pack("{so,ss,so,so,sb}", "name", cycles_name(m->name), "kind", KIND[m->kind],
                           "reflectance", cycles_rgb(m->reflectance), "radiance",
                           cycles_rgb(m->radiance), "both_sides", m->radiance_both_sides);
-    json_t *more = NULL;
-    if (m->kind == MATERIAL_DIFFUSE || m->kind == MATERIAL_MIRROR)
-        return o;
     if (m->kind == MATERIAL_REFRACTION || m->kind == MATERIAL_GLASS)
-        more = json_pack("{so,sf,sb}", "transmittance", cycles_rgb(m->transmittance), "ior",
-                         (double)m->ior, "schlick", m->schlick);
-    else
-        more = json_pack("{ss,sf,sb,sb,so,so}", "distribution",
-                         m->microfacet == MICROFACET_GGX ? "ggx" : "beckmann", "alpha",
-                         (double)m->alpha, "separable", m->separable, "facets", needs_facets(m),
-                         "eta", m->conductor ? cycles_rgb(m->eta) : json_null(), "k",
-                         m->conductor ? cycles_rgb(m->k) : json_null());
-    bool ok = json_object_update_missing(o, more) == 0;
+        json_object_update_new(o, json_pack("{so,sf,sb}", "transmittance",
+                                            cycles_rgb(m->transmittance), "ior", (double)m->ior,
+                                            "schlick", m->schlick));
+    if (m->kind == MATERIAL_MICROFACET || m->kind == MATERIAL_PLASTIC)
+        json_object_update_new(o, json_pack("{ss,sf,sb,sb,so,so}", "distribution",
+                                            m->microfacet == MICROFACET_GGX ? "ggx" : "beckmann",
+                                            "alpha", (double)m->alpha, "separable", m->separable,
+                                            "facets", needs_facets(m), "eta",
+                                            m->conductor ? cycles_rgb(m->eta) : json_null(), "k",
+                                            m->conductor ? cycles_rgb(m->k) : json_null()));
     if (m->kind == MATERIAL_PLASTIC)
-        ok = json_object_set_new(o, "specular", cycles_rgb(m->specular)) == 0 &&
-             json_object_set_new(o, "mirror", cycles_rgb(m->mirror)) == 0 && ok;
-    json_decref(more);
-    if (ok)
-        return o;
-    json_decref(o);
-    return NULL;
+        json_object_update_new(o, json_pack("{so,so}", "specular", cycles_rgb(m->specular),
+                                            "mirror", cycles_rgb(m->mirror)));
+    return o;
+}
+
+static bool set_map(json_t *material, const char *key, const struct scene *s, uint32_t map,
+                    const char *dump, struct err *e)
+{
+    return map == 0 || json_object_set_new(material, key, cycles_map(s, map, dump, e)) == 0;
 }
 
 json_t *cycles_materials(const struct scene *s, const char *dump, struct err *e)
 {
     json_t *out = json_array();
     const char *light = unsampled_light(s);
-    for (uint32_t i = 0; i < s->num_materials; i++) {
+    bool ok = true;
+    for (uint32_t i = 0; ok && i < s->num_materials; i++) {
         const struct material *m = &s->materials[i];
-        if (KIND[m->kind] == NULL) {
-            err_set(e, "Cycles does not have %s (material '%s')", features_material_names[m->kind],
-                    m->name);
-            json_decref(out);
-            return NULL;
-        }
-        if (needs_facets(m) && light != NULL) {
-            err_set(
+        if (KIND[m->kind] == NULL)
+            ok = err_set(e, "Cycles does not have %s (material '%s')",
+                         features_material_names[m->kind], m->name);
+        else if (needs_facets(m) && light != NULL)
+            ok = err_set(
                 e,
                 "Cycles: material '%s': %s cannot light a microfacet that is not GGX, separable, "
                 "of constant reflectance and of alpha 0.01 to 1",
                 m->name, light);
-            json_decref(out);
-            return NULL;
-        }
-        cycles_push(&out, with_maps(reflection(m), s, m, dump));
+        if (!ok)
+            break;
+        json_t *material = material_json(m);
+        json_array_append_new(out, material);
+        ok = set_map(material, "reflectance_map", s, m->reflectance_map, dump, e) &&
+             set_map(material, "radiance_map", s, m->radiance_map, dump, e);
     }
-    return out;
+    if (ok)
+        return out;
+    json_decref(out);
+    return NULL;
 }
 
-static void push3(json_t **array, vec3 v, float sign)
+static void push(json_t *array, const float *v, int num, float sign)
 {
-    cycles_push(array, json_real(sign * v.x));
-    cycles_push(array, json_real(sign * v.y));
-    cycles_push(array, json_real(sign * v.z));
-}
-
-static void push_uv(json_t **array, struct uv uv)
-{
-    cycles_push(array, json_real((double)uv.u));
-    cycles_push(array, json_real((double)uv.v));
+    for (int k = 0; k < num; k++)
+        json_array_append_new(array, json_real((double)(sign * v[k])));
 }
 
 /* A triangle's shading normals: +1 all on the geometric normal's side, -1 all on the other (the
@@ -144,7 +124,7 @@ static int normals_side(const vec3 *p, const vec3 *n, bool *flat)
 }
 
 /* The flat or the smooth triangles of one object; appended if there are any. */
-static bool push_mesh(json_t **out, const struct scene *s, const struct object *o, bool smooth,
+static bool push_mesh(json_t *out, const struct scene *s, const struct object *o, bool smooth,
                       struct err *e)
 {
     json_t *positions = json_array(), *normals = json_array(), *uvs = json_array();
@@ -159,23 +139,17 @@ static bool push_mesh(json_t **out, const struct scene *s, const struct object *
                 e, "Cycles: object '%s': triangle %u has shading normals on both of its sides",
                 o->name, i - o->first_triangle);
         for (int k = 0; ok && flat != smooth && k < 3; k++) {
-            push3(&positions, p[k], 1);
-            if (smooth)
-                push3(&normals, n[k], (float)side);
+            push(positions, &p[k].x, 3, 1);
+            push(normals, &n[k].x, smooth ? 3 : 0, (float)side);
             if (has_map)
-                push_uv(&uvs, s->uv[3 * (size_t)i + (size_t)k]);
+                push(uvs, &s->uv[3 * (size_t)i + (size_t)k].u, 2, 1);
         }
     }
-    if (ok && (positions == NULL || json_array_size(positions) > 0)) {
-        json_t *mesh =
-            json_pack("{so,si,sO,sO}", "name", cycles_name(o->name), "material", (int)o->material,
-                      "positions", positions, "normals", smooth ? normals : json_null());
-        if (has_map && json_object_set(mesh, "uv", uvs) != 0) {
-            json_decref(mesh);
-            mesh = NULL;
-        }
-        cycles_push(out, mesh);
-    }
+    if (ok && json_array_size(positions) > 0)
+        json_array_append_new(out, json_pack("{so,si,sO,sO,sO*}", "name", cycles_name(o->name),
+                                             "material", (int)o->material, "positions", positions,
+                                             "normals", smooth ? normals : json_null(), "uv",
+                                             has_map ? uvs : NULL));
     json_decref(uvs);
     json_decref(positions);
     json_decref(normals);
@@ -185,13 +159,12 @@ static bool push_mesh(json_t **out, const struct scene *s, const struct object *
 json_t *cycles_meshes(const struct scene *s, struct err *e)
 {
     json_t *out = json_array();
-    for (uint32_t i = 0; i < s->num_objects; i++) {
-        const struct object *o = &s->objects[i];
-        if (!push_mesh(&out, s, o, false, e) || !push_mesh(&out, s, o, true, e)) {
+    for (uint32_t i = 0; i < s->num_objects; i++)
+        if (!push_mesh(out, s, &s->objects[i], false, e) ||
+            !push_mesh(out, s, &s->objects[i], true, e)) {
             json_decref(out);
             return NULL;
         }
-    }
     return out;
 }
 
@@ -206,12 +179,12 @@ json_t *cycles_spheres(const struct scene *s, vec3 eye)
         bool opaque = m->kind != MATERIAL_REFRACTION && m->kind != MATERIAL_GLASS;
         bool inside = d3_length(d3_sub(cycles_wide(eye), cycles_wide(sp->centre))) < sp->radius;
         bool dark = rgb_is_zero(m->radiance);
-        cycles_push(&out,
-                    json_pack("{so,si,so,sf,si,sb}", "name",
-                              cycles_name(s->objects[s->sphere_object[i]].name), "material",
-                              (int)s->sphere_material[i], "centre", cycles_vec3(sp->centre),
-                              "radius", (double)sp->radius, "normal_out",
-                              sp->normal_out > 0 ? 1 : -1, "exact", opaque && dark && !inside));
+        json_array_append_new(out, json_pack("{so,si,so,sf,si,sb}", "name",
+                                             cycles_name(s->objects[s->sphere_object[i]].name),
+                                             "material", (int)s->sphere_material[i], "centre",
+                                             cycles_vec3(sp->centre), "radius", (double)sp->radius,
+                                             "normal_out", sp->normal_out > 0 ? 1 : -1, "exact",
+                                             opaque && dark && !inside));
     }
     return out;
 }

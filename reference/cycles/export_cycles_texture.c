@@ -47,7 +47,7 @@ void cycles_remove_textures(const char *dump, uint32_t written)
         unlink(image_file(dump, i).s);
 }
 
-json_t *cycles_map(const struct scene *s, uint32_t map, const char *dump)
+json_t *cycles_map(const struct scene *s, uint32_t map, const char *dump, struct err *e)
 {
     static const char *const WRAPS[] = {[TEXTURE_WRAP] = "repeat",
                                         [TEXTURE_MIRROR] = "mirror",
@@ -56,8 +56,7 @@ json_t *cycles_map(const struct scene *s, uint32_t map, const char *dump)
     const struct texture *t = &s->textures[map - 1];
     const struct path file = image_file(dump, map - 1);
     char sha256[65];
-    struct err ignored;
-    if (!sha256_file(file.s, sha256, &ignored))
+    if (!sha256_file(file.s, sha256, e))
         return NULL;
     return json_pack("{ss,ss,s[ss],s[ii],s[ii],sb}", "file", fs_base(file.s), "sha256", sha256,
                      "wrap", WRAPS[t->wrap[0]], WRAPS[t->wrap[1]], "size", t->width, t->height,

@@ -2,7 +2,7 @@
 
 #include "import_geometry.h"
 #include "reference/base/json_file.h"
-#include "reference/base/process.h"
+#include "reference/cycles/blender.h"
 
 #include "renderer/base/fs.h"
 
@@ -208,10 +208,8 @@ static bool write_jobs(const struct suite_scene *const *scene, int num, const ch
         char full[PATH_MAX];
         ok = realpath(scene[i]->dae, full) != NULL ||
              err_set(e, "%s: %s", scene[i]->dae, strerror(errno));
-        ok = ok && (json_array_append_new(jobs, json_pack("{s:s, s:i, s:i}", "dae", full, "width",
-                                                          scene[i]->width, "height",
-                                                          scene[i]->height)) == 0 ||
-                    err_set(e, "out of memory"));
+        json_array_append_new(jobs, json_pack("{s:s, s:i, s:i}", "dae", ok ? full : "", "width",
+                                              scene[i]->width, "height", scene[i]->height));
     }
     ok = ok && json_write(fs_path("%s/jobs.json", dir).s, jobs, e);
     json_decref(jobs);
@@ -220,16 +218,16 @@ static bool write_jobs(const struct suite_scene *const *scene, int num, const ch
 
 static bool read_dumps(int num, const char *dir, json_t **dumps, struct err *e)
 {
-    char path[4096 + 32];
     json_error_t why;
     *dumps = json_array();
     for (int i = 0; i < num; i++) {
-        snprintf(path, sizeof path, "%s/import_%04d.json", dir, i);
-        json_t *dump = json_read(path, 0, &why);
-        if (dump == NULL || json_array_append_new(*dumps, dump) != 0) {
+        const struct path path = fs_path("%s/import_%04d.json", dir, i);
+        json_t *dump = json_read(path.s, 0, &why);
+        if (dump == NULL) {
             json_decref(*dumps);
-            return err_set(e, "%s: %s", path, why.text);
+            return err_set(e, "%s: %s", path.s, why.text);
         }
+        json_array_append_new(*dumps, dump);
     }
     return true;
 }
@@ -239,32 +237,12 @@ bool import_check_run(const struct suite_scene *const *scene, int num,
 {
     struct path temp = fs_path("%s/import-XXXXXX", opt->work_dir);
     const char *const dir = temp.s;
-    const struct path relative = fs_path("%s/import_check/blender_import.py", opt->share_dir);
-    char *script = realpath(relative.s, NULL);
-    if (script == NULL)
-        return err_set(e, "%s: %s", relative.s, strerror(errno));
-    if (mkdtemp(temp.s) == NULL) {
-        free(script);
+    if (mkdtemp(temp.s) == NULL)
         return err_set(e, "%s: cannot make a directory in it: %s", opt->work_dir, strerror(errno));
-    }
-    const struct path log = fs_path("%s/blender.log", dir);
-    const char *const argv[] = {"blender",
-                                "-b",
-                                "--factory-startup",
-                                "-noaudio",
-                                "--python-exit-code",
-                                "3",
-                                "-P",
-                                script,
-                                "--",
-                                "--jobs",
-                                "jobs.json",
-                                NULL};
-    const struct process p = {.argv = argv, .cwd = dir, .log = log.s, .timeout_s = opt->timeout_s};
-    bool ok = write_jobs(scene, num, dir, e) && process_run(&p, NULL, e) &&
-              read_dumps(num, dir, dumps, e);
-    free(script);
-    if (!ok) {
+    if (!write_jobs(scene, num, dir, e) ||
+        !blender_run(BLENDER_RUN "blender_import.py -- --jobs jobs.json", opt->share_dir,
+                     "import_check/blender_import.py", dir, opt->timeout_s, e) ||
+        !read_dumps(num, dir, dumps, e)) {
         struct err why = *e;
         return err_set(e, "%.900s (see %s)", why.msg, dir);
     }
@@ -293,13 +271,11 @@ static json_t *report_json(const char *scene, const struct import_report *r)
 bool import_check(const struct suite_scene *const *scene, int num, const struct import_options *opt,
                   json_t **reports, struct err *e)
 {
-    json_t *dumps, *all = json_array();
-    if (!import_check_run(scene, num, opt, &dumps, e)) {
-        json_decref(all);
+    json_t *dumps;
+    if (!import_check_run(scene, num, opt, &dumps, e))
         return false;
-    }
-    bool ok = all != NULL;
-    for (int i = 0; ok && i < num; i++) {
+    *reports = json_array();
+    for (int i = 0; i < num; i++) {
         struct scene s;
         struct camera c;
         struct import_report r;
@@ -316,11 +292,8 @@ bool import_check(const struct suite_scene *const *scene, int num, const struct 
         }
         if (report == NULL)
             report = json_pack("{s:s, s:s}", "scene", scene[i]->name, "error", why.msg);
-        ok = json_array_append_new(all, report) == 0;
+        json_array_append_new(*reports, report);
     }
     json_decref(dumps);
-    *reports = all;
-    if (!ok)
-        json_decref(all);
-    return ok || err_set(e, "import check: out of memory");
+    return true;
 }

@@ -221,10 +221,11 @@ static bool render(const struct reference_job *job, int first, int last, json_t 
     if (!povray_replicates(job, &set, e))
         return false;
     w.next = first;
-    return run_crew(&w, e) && engine_version(&w, version, e) && sha256_file(program, sha256, e) &&
-           ((json_object_set_new(said, "version", json_string(version)) == 0 &&
-             json_object_set_new(said, "binary_sha256", json_string(sha256)) == 0) ||
-            err_set(e, "out of memory"));
+    if (!run_crew(&w, e) || !engine_version(&w, version, e) || !sha256_file(program, sha256, e))
+        return false;
+    json_object_set_new(said, "version", json_string(version));
+    json_object_set_new(said, "binary_sha256", json_string(sha256));
+    return true;
 }
 
 static bool count(const struct reference_job *job, int *num, struct err *e)

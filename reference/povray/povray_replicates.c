@@ -50,8 +50,7 @@ void povray_command_line(const struct povray_replicates *s, const char *program,
     memcpy(argv, args, sizeof args);
 }
 
-static bool describe(const struct povray_replicates *s, const json_t *said, json_t *manifest,
-                     struct err *e)
+static void describe(const struct povray_replicates *s, const json_t *said, json_t *manifest)
 {
     char text[4][32], command[512] = "povray";
     const char *argv[POVRAY_ARGS];
@@ -84,22 +83,18 @@ static bool describe(const struct povray_replicates *s, const json_t *said, json
                   "lamp_cells", fine.variant.lamp_cells, "rule",
                   fine.variant.rule == POVRAY_GAUSS ? "gauss2" : "shifted grid");
     json_t *scheme = replicates > 0
-                         ? json_pack("{s:i, s:i, s:f, s:O}", "subgrid", s->job->ref->subgrid,
+                         ? json_pack("{s:i, s:i, s:f, s:o}", "subgrid", s->job->ref->subgrid,
                                      "jittered_lamp_cells", first.variant.lamp_cells, "roulette",
                                      POVRAY_ROULETTE, "block_sizes", blocks)
                          : json_string("none: the picture has no noise");
-    bool ok =
-        json_object_set(settings, "replicate", scheme) == 0 &&
-        json_object_set(manifest, "version", json_object_get(said, "version")) == 0 &&
-        json_object_set(manifest, "binary_sha256", json_object_get(said, "binary_sha256")) == 0 &&
-        json_object_set_new(manifest, "command", json_string(command)) == 0 &&
-        json_object_set(manifest, "settings", settings) == 0 &&
-        json_object_set(manifest, "seeds", seeds) == 0;
-    json_decref(settings);
-    json_decref(scheme);
-    json_decref(seeds);
-    json_decref(blocks);
-    return ok || err_set(e, "POV-Ray manifest: out of memory");
+    json_object_set_new(settings, "replicate", scheme);
+    json_object_set(manifest, "version", json_object_get(said, "version"));
+    json_object_set(manifest, "binary_sha256", json_object_get(said, "binary_sha256"));
+    json_object_set_new(manifest, "command", json_string(command));
+    json_object_set_new(manifest, "settings", settings);
+    json_object_set_new(manifest, "seeds", seeds);
+    if (replicates == 0)
+        json_decref(blocks);
 }
 
 /* The mean of the windows. */
@@ -184,6 +179,8 @@ bool povray_fold(const struct reference_job *job, const struct replicate_images 
                  const json_t *said, struct moments *out, json_t *manifest, struct err *e)
 {
     struct povray_replicates s;
-    return povray_replicates(job, &s, e) && describe(&s, said, manifest, e) &&
-           fold_images(&s, images, out, manifest, e);
+    if (!povray_replicates(job, &s, e))
+        return false;
+    describe(&s, said, manifest);
+    return fold_images(&s, images, out, manifest, e);
 }

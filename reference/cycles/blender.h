@@ -1,0 +1,15 @@
+/* Blender run without its window. */
+#ifndef ASSAY_BLENDER_H
+#define ASSAY_BLENDER_H
+
+#include "renderer/base/err.h"
+
+/* The words before "--" of every command. */
+#define BLENDER_RUN "blender -b --factory-startup -noaudio --python-exit-code 3 -P "
+
+/* Runs a command, in which the script's base name stands for the file `script` of share_dir, in the directory dir, where what it prints
+ * becomes blender.log. */
+bool blender_run(const char *command, const char *share_dir, const char *script, const char *dir,
+                 double timeout_s, struct err *e) __attribute__((warn_unused_result));
+
+#endif
