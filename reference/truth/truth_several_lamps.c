@@ -113,10 +113,8 @@ static bool fill_lamps(const struct suite_scene *scene, json_t *values, struct m
     if (json_array_size(array) == 0 || json_array_size(array) > MAX_LAMPS)
         return err_set(e, "lamps is not an array of 1 to %d", MAX_LAMPS);
     json_array_foreach(array, i, value)
-    {
         if (!read_lamp(value, &l.lamp[l.num++], e))
             return err_prefix(e, "lamps[%zu]", i);
-    }
     if (!truth_check_triple("albedo", l.albedo, 1, e) || !truth_check_depth(scene, e))
         return false;
     if (l.foot_x[0] == l.foot_x[1] || l.foot_z[0] == l.foot_z[1])

@@ -161,8 +161,7 @@ static bool fill_pictures(const struct suite_scene *scene, json_t *values, struc
         ok = err_set(e, "%s", why.text);
     ok = ok && truth_check_depth(scene, e) && read_picture(rows, t, e);
     if (ok)
-        json_array_foreach(boards, i, value)
-        {
+        json_array_foreach(boards, i, value) {
             struct board b;
             ok = ok && read_board(value, &b, e);
             if (ok)

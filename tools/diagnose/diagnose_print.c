@@ -103,10 +103,8 @@ void diagnose_print(FILE *f, const struct catalogue *c, const struct observation
     size_t i;
     const json_t *s;
     json_array_foreach(skipped, i, s)
-    {
         fprintf(f, "not looked at: %s: %s\n", json_string_value(json_object_get(s, "view")),
                 json_string_value(json_object_get(s, "reason")));
-    }
 }
 
 /* null where there is no number: nothing could be explained, or p underflows. */

@@ -6,6 +6,7 @@
 #include "renderer/base/fs.h"
 #include "renderer/base/sha256.h"
 #include "renderer/base/version.h"
+#include "tools/base/text.h"
 
 #include <fcntl.h>
 #include <stdio.h>
@@ -46,14 +47,13 @@ static bool key_of(const char *const *argv, const char *scene_file, const char *
                    char key[65], struct err *e)
 {
     char text[TEXT + 512], hash[65], other[65] = "";
-    size_t n = 0;
     if (!sha256_file(scene_file, hash, e) ||
         (environment != NULL && !sha256_file(environment, other, e)))
         return false;
-    n += (size_t)snprintf(text, sizeof text, "%s %s %s", assay_version, hash, other);
-    for (const char *const *a = argv + 1; *a != NULL && n < sizeof text; a++)
+    snprintf(text, sizeof text, "%s %s %s", assay_version, hash, other);
+    for (const char *const *a = argv + 1; *a != NULL; a++)
         if (strcmp(a[-1], "-t") != 0)
-            n += (size_t)snprintf(text + n, sizeof text - n, " %s", *a);
+            text_append(text, sizeof text, " %s", *a);
     sha256_text(text, key);
     return true;
 }
@@ -256,6 +256,14 @@ void answer_key_free(struct answer_key *a)
             moments_free(&a->of[k][i].noise);
             moments_free(&a->of[k][i].as_asked);
         }
+}
+
+int answer_key_set(const struct rubric *r, const char *name)
+{
+    int k = r->num_sets - 1;
+    while (k > 0 && strcmp(r->set[k].name, name) != 0)
+        k--;
+    return k;
 }
 
 const struct moments *answer_key_image(const struct answer_key *a, int set, int image)

@@ -2,6 +2,7 @@
 
 #include "rate_image.h"
 #include "stopping_rule.h"
+#include "tools/base/text.h"
 #include "tools/diagnose/bug_fit.h"
 #include "tools/stats/distributions.h"
 
@@ -326,14 +327,13 @@ static bool judge(const struct carry *w, const struct rubric_check *c, int bugs,
 
 static void tell(const struct carry *w, int bugs, struct result *out)
 {
-    size_t n = (size_t)snprintf(out->carried, sizeof out->carried,
-                                "held against images with what has been paid before:");
+    snprintf(out->carried, sizeof out->carried,
+             "held against images with what has been paid before:");
     for (int k = 0; k < w->num; k++)
-        if (bugs >> k & 1 && n < sizeof out->carried)
-            n +=
-                (size_t)snprintf(out->carried + n, sizeof out->carried - n, "%s %s (Part %s)",
-                                 k > 0 && bugs == 3 ? ";" : "", w->b->catalogue.bug[w->bug[k]].what,
-                                 w->r->part[w->paid[k]].number);
+        if (bugs >> k & 1)
+            text_append(out->carried, sizeof out->carried, "%s %s (Part %s)",
+                        k > 0 && bugs == 3 ? ";" : "", w->b->catalogue.bug[w->bug[k]].what,
+                        w->r->part[w->paid[k]].number);
 }
 
 static bool carry_check(const struct carry *w, int check, struct result *result, struct err *e)

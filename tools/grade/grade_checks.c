@@ -2,6 +2,7 @@
 
 #include "rate_image.h"
 #include "stopping_rule.h"
+#include "tools/base/text.h"
 #include "tools/stats/distributions.h"
 
 #include <math.h>
@@ -191,11 +192,11 @@ void grade_checks_tell(const struct difference *a, char *text, size_t size)
             worst = &a->image[c];
             channel = c;
         }
-    int n = snprintf(text, size, "mean of the image (%s) %+.2f %% (%+.2f to %+.2f)", names[channel],
-                     100 * worst->value, 100 * worst->lo, 100 * worst->hi);
-    if (a->tiles > 0 && n > 0 && (size_t)n < size)
-        snprintf(text + n, size - (size_t)n, "; furthest tile at %d,%d: %+.1f %% (%+.1f to %+.1f)",
-                 a->tile_x, a->tile_y, 100 * a->tile.value, 100 * a->tile.lo, 100 * a->tile.hi);
+    snprintf(text, size, "mean of the image (%s) %+.2f %% (%+.2f to %+.2f)", names[channel],
+             100 * worst->value, 100 * worst->lo, 100 * worst->hi);
+    if (a->tiles > 0)
+        text_append(text, size, "; furthest tile at %d,%d: %+.1f %% (%+.1f to %+.1f)", a->tile_x,
+                    a->tile_y, 100 * a->tile.value, 100 * a->tile.lo, 100 * a->tile.hi);
 }
 
 /* One more interval that decides: the smallest share counts. */
@@ -474,11 +475,11 @@ static bool check_exact(const struct work *w, struct result *out, struct err *e)
     snprintf(out->expected, sizeof out->expected,
              "all pixels of objects as in the reference, at most %.3g %% of them not",
              100 * w->check->share.full);
-    int n = snprintf(out->seen, sizeof out->seen, "%.0f of %.0f pixels differ (%.2f %%)", wrong,
-                     num, 100 * wrong / fmax(1, num));
+    snprintf(out->seen, sizeof out->seen, "%.0f of %.0f pixels differ (%.2f %%)", wrong, num,
+             100 * wrong / fmax(1, num));
     if (first >= 0)
-        snprintf(out->seen + n, sizeof out->seen - (size_t)n,
-                 ", the first at %d,%d from the top left", first % s->width, first / s->width);
+        text_append(out->seen, sizeof out->seen, ", the first at %d,%d from the top left",
+                    first % s->width, first / s->width);
     return true;
 }
 

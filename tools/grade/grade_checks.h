@@ -31,6 +31,8 @@ bool answer_key_make(const struct rubric *r, const struct answer_options *opt,
                      struct answer_key *out, struct err *e) __attribute__((warn_unused_result));
 void answer_key_free(struct answer_key *a);
 
+/* The set of that name; 0 where the rubric has none. */
+int answer_key_set(const struct rubric *r, const char *name);
 /* With the deviations of `set`, where these change it: the image as it should be (NULL: the rubric gives none), and how many
  * samples each of its pixels takes. */
 const struct moments *answer_key_image(const struct answer_key *a, int set, int image);

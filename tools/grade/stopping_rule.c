@@ -139,6 +139,16 @@ static void run_all(const struct simulation *s, const double *kappa, double fact
     out->most = fmax(out->most, taken);
 }
 
+/* All shapes, with kappa at both ends of its interval. */
+static void simulate(const struct simulation *s, const double *kappa, double sd,
+                     struct stopping *out)
+{
+    out->least = INFINITY;
+    for (int kind = 0; kind < SHAPES; kind++)
+        for (int end = -1; end <= 1; end += 2)
+            run_all(s, kappa, exp(end * uncertain * sd), kind, out);
+}
+
 bool stopping_rule_range(const struct rubric_image *p, const struct submitted_image *s,
                          const struct submitted_image *right, const struct moments *m,
                          const unsigned char *use, struct stopping *out, struct err *e)
@@ -146,9 +156,8 @@ bool stopping_rule_range(const struct rubric_image *p, const struct submitted_im
     size_t tiles = (size_t)(p->width / RUBRIC_TILE) * (size_t)(p->height / RUBRIC_TILE);
     double *kappa = calloc(tiles, sizeof *kappa), sd;
     gsl_rng *rng = gsl_rng_alloc(gsl_rng_taus2);
-    *out = (struct stopping){.least = INFINITY};
-    out->low = calloc(tiles, sizeof *out->low);
-    out->high = calloc(tiles, sizeof *out->high);
+    *out = (struct stopping){.low = calloc(tiles, sizeof *out->low),
+                             .high = calloc(tiles, sizeof *out->high)};
     bool ok = (kappa != NULL && rng != NULL && out->low != NULL && out->high != NULL) ||
               err_set(e, "out of memory");
     if (ok) {
@@ -158,9 +167,7 @@ bool stopping_rule_range(const struct rubric_image *p, const struct submitted_im
                                        .batch = rubric_option(p, "-a", 0),
                                        .tolerance = rubric_option(p, "-a", 1)};
         difference_kappas(s, right, use, kappa, &sd);
-        for (int kind = 0; kind < SHAPES; kind++)
-            for (int end = -1; end <= 1; end += 2)
-                run_all(&sim, kappa, exp(end * uncertain * sd), kind, out);
+        simulate(&sim, kappa, sd, out);
     } else {
         stopping_rule_free(out);
     }
@@ -228,10 +235,8 @@ bool stopping_rule_samples(const struct rubric_image *p, const struct submitted_
         light_of(s, m, light);
         for (int by = 0; by < NUM_STOPPING_KINDS; by++) {
             sim.by = (enum stopping_kind)by;
-            out[by] = (struct stopping){.least = INFINITY};
-            for (int kind = 0; kind < SHAPES; kind++)
-                for (int end = -1; end <= 1; end += 2)
-                    run_all(&sim, kappa, exp(end * uncertain * sd), kind, &out[by]);
+            out[by] = (struct stopping){0};
+            simulate(&sim, kappa, sd, &out[by]);
         }
     }
     submitted_image_free(&right);

@@ -147,6 +147,18 @@ static void drop_small(struct submitted_image *s)
     s->num_runs = num;
 }
 
+/* The pixels of the 3 x 3 around pixel p that are in the image, itself too; how many. */
+static int neighbours(const struct submitted_image *s, size_t p, size_t at[9])
+{
+    int num = 0, x = (int)(p % (size_t)s->width), y = (int)(p / (size_t)s->width);
+    for (int k = 0; k < 9; k++) {
+        int u = x - 1 + k % 3, v = y - 1 + k / 3;
+        if (u >= 0 && v >= 0 && u < s->width && v < s->height)
+            at[num++] = (size_t)v * (size_t)s->width + (size_t)u;
+    }
+    return num;
+}
+
 static double luminance_of(const double *px)
 {
     return luminance_weight[0] * px[0] + luminance_weight[1] * px[1] + luminance_weight[2] * px[2];
@@ -223,27 +235,23 @@ void submitted_image_expect(struct submitted_image *s, const struct moments *m, 
     for (int k = 0; k < s->num_runs; k++)
         submitted_image_expect(&s->run[k], m, s->run[k].spp);
     spp = s->num_runs > 0 ? s->spp : spp;
-    for (int y = 0; y < s->height; y++)
-        for (int x = 0; x < s->width; x++)
-            for (size_t c = 0; c < 3; c++) {
-                double v = 0, k3 = 0, num = 0;
-                for (int k = 0; k < 9; k++) {
-                    int u = x - 1 + k % 3, w = y - 1 + k / 3;
-                    if (u < 0 || w < 0 || u >= s->width || w >= s->height)
-                        continue;
-                    size_t p = (size_t)w * (size_t)s->width + (size_t)u;
-                    double n = m->n[p], paths = fmax(1, m->spp) / spp;
-                    if (m->mean[3 * p + c] >= s->clip)
-                        continue;
-                    v += n > 1 ? m->m2[3 * p + c] / (n - 1) * paths : 0;
-                    k3 += n > 2 ? n * m->m3[3 * p + c] / ((n - 1) * (n - 2)) * paths * paths : 0;
-                    num++;
-                }
-                size_t i = 3 * ((size_t)y * (size_t)s->width + (size_t)x) + c;
-                bool varies = m->mean[i] < s->clip;
-                s->variance[i] = varies ? v / num : 0;
-                s->k3[i] = varies ? k3 / num : 0;
-            }
+    const double paths = fmax(1, m->spp) / spp;
+    for (size_t i = 0; i < 3 * (size_t)s->width * (size_t)s->height; i++) {
+        double v = 0, k3 = 0, num = 0;
+        size_t at[9];
+        for (int k = 0, all = neighbours(s, i / 3, at); k < all; k++) {
+            size_t j = 3 * at[k] + i % 3;
+            double n = m->n[at[k]];
+            if (m->mean[j] >= s->clip)
+                continue;
+            v += n > 1 ? m->m2[j] / (n - 1) * paths : 0;
+            k3 += n > 2 ? n * m->m3[j] / ((n - 1) * (n - 2)) * paths * paths : 0;
+            num++;
+        }
+        bool varies = m->mean[i] < s->clip;
+        s->variance[i] = varies ? v / num : 0;
+        s->k3[i] = varies ? k3 / num : 0;
+    }
 }
 
 bool submitted_image_from(const struct moments *m, const struct submitted_image *like,
@@ -343,18 +351,12 @@ double submitted_image_expected_sd(const struct moments *reference, size_t i, do
 static void clear_around(const struct submitted_image *s, const unsigned char *mark,
                          unsigned char kind, unsigned char spared, unsigned char *use)
 {
-    for (int y = 0; y < s->height; y++)
-        for (int x = 0; x < s->width; x++) {
-            size_t p = (size_t)y * (size_t)s->width + (size_t)x;
-            bool beside = false;
-            for (int k = 0; k < 9; k++) {
-                int u = x - 1 + k % 3, v = y - 1 + k / 3;
-                if (u >= 0 && v >= 0 && u < s->width && v < s->height)
-                    beside |= mark[(size_t)v * (size_t)s->width + (size_t)u] >= kind;
-            }
-            if (beside && mark[p] != spared)
+    for (size_t p = 0; p < (size_t)s->width * (size_t)s->height; p++) {
+        size_t at[9];
+        for (int k = 0, all = neighbours(s, p, at); k < all; k++)
+            if (mark[at[k]] >= kind && mark[p] != spared)
                 use[p] = 0;
-        }
+    }
 }
 
 /* A few pixels at the rim of a lamp, or of a caustic, can hold most of an image's noise and all of its skewness. */
@@ -382,17 +384,13 @@ static void drop_loudest(const struct submitted_image *s, const struct moments *
 /* As measured in the pixels around, of the run that has fewest samples. */
 static double measured_sd(const struct submitted_image *s, size_t i)
 {
-    double sum = 0, num = 0, least = INFINITY;
-    int x = (int)(i / 3 % (size_t)s->width), y = (int)(i / 3 / (size_t)s->width);
+    double sum = 0, least = INFINITY;
+    size_t at[9];
+    int num = neighbours(s, i / 3, at);
     for (int k = 0; k < s->num_runs; k++)
         least = fmin(least, s->run[k].spp);
-    for (int k = 0; k < 9; k++) {
-        int u = x - 1 + k % 3, v = y - 1 + k / 3;
-        if (u < 0 || v < 0 || u >= s->width || v >= s->height)
-            continue;
-        sum += s->measured[4 * ((size_t)v * (size_t)s->width + (size_t)u) + i % 3];
-        num++;
-    }
+    for (int k = 0; k < num; k++)
+        sum += s->measured[4 * at[k] + i % 3];
     return sqrt(sum / num * s->spp / least);
 }
 
@@ -428,13 +426,12 @@ bool submitted_image_comparable(const struct submitted_image *s, const struct mo
 
 void submitted_image_unclipped(const struct submitted_image *s, unsigned char *use)
 {
-    for (int y = 0; y < s->height; y++)
-        for (int x = 0; x < s->width; x++)
-            for (int k = 0; k < 9; k++) {
-                int u = x - 1 + k % 3, v = y - 1 + k / 3;
-                const unsigned char *c =
-                    s->clipped + 3 * ((size_t)v * (size_t)s->width + (size_t)u);
-                if (u >= 0 && v >= 0 && u < s->width && v < s->height && (c[0] || c[1] || c[2]))
-                    use[(size_t)y * (size_t)s->width + (size_t)x] = 0;
-            }
+    for (size_t p = 0; p < (size_t)s->width * (size_t)s->height; p++) {
+        size_t at[9];
+        for (int k = 0, all = neighbours(s, p, at); k < all; k++) {
+            const unsigned char *c = s->clipped + 3 * at[k];
+            if (c[0] || c[1] || c[2])
+                use[p] = 0;
+        }
+    }
 }

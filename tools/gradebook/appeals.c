@@ -116,10 +116,8 @@ static void decide(const struct appeal *one, const struct rubric_check *c, json_
     add_points(check, more);
     add_points(grade, more);
     json_array_foreach(json_object_get(grade, "parts"), i, part)
-    {
         if (strcmp(member_or_empty(part, "number"), member_or_empty(check, "part")) == 0)
             add_points(part, more);
-    }
     json_object_set_new(check, "share", json_real(c->points > 0 ? one->points / c->points : 1));
     json_object_set_new(check, "judged", json_true());
     json_object_del(check, "provisional");

@@ -19,8 +19,7 @@ static void histogram(FILE *f, const json_t *grades)
     double count[BARS] = {0}, most = 1;
     size_t i;
     json_t *g;
-    json_array_foreach(grades, i, g)
-    {
+    json_array_foreach(grades, i, g) {
         double share = member_number(g, "points") / fmax(1e-9, member_number(g, "of"));
         int bar = (int)(share * BARS);
         count[bar < BARS ? bar : BARS - 1]++;
@@ -49,6 +48,11 @@ static void link_to(FILE *f, const char *id, const char *file, const char *text)
         else
             fprintf(f, "%%%02X", (unsigned)(unsigned char)*c);
     html_print(f, "/%s\">%s</a>", file, text);
+}
+
+static void link_to_staff(FILE *f, const json_t *grade)
+{
+    link_to(f, member_or_empty(grade, "id"), "staff.html", member_or_empty(grade, "id"));
 }
 
 /* Those that need staff first, then those with the fewest points. */
@@ -84,8 +88,7 @@ static void summary(FILE *f, json_t *const *sorted, size_t num)
         fprintf(f, "<p><b>None of %zu needs you</b>", num);
     for (size_t i = 0; i < needed && i < NAMED; i++) {
         fputs(i == 0 ? ": " : ", ", f);
-        link_to(f, member_or_empty(sorted[i], "id"), "staff.html",
-                member_or_empty(sorted[i], "id"));
+        link_to_staff(f, sorted[i]);
         html_print(f, " (%s)", in_short(sorted[i]));
     }
     if (needed > NAMED)
@@ -97,8 +100,7 @@ static void bugs_of(FILE *f, const json_t *g)
 {
     size_t k;
     json_t *b;
-    json_array_foreach(json_object_get(json_object_get(g, "diagnosis"), "named"), k, b)
-    {
+    json_array_foreach(json_object_get(json_object_get(g, "diagnosis"), "named"), k, b) {
         const char *and = member_or_empty(b, "and_bug");
         html_print(f, "%s%s%s%s", k > 0 ? "; or " : "", member_text(b, "bug"),
                    and[0] != '\0' ? ", and " : "", and);
@@ -114,14 +116,14 @@ static void bugs_of(FILE *f, const json_t *g)
 static void row(FILE *f, const json_t *g, size_t parts)
 {
     char text[2048];
-    const char *id = member_or_empty(g, "id"), *accepted = member_or_empty(g, "accepted");
+    const char *accepted = member_or_empty(g, "accepted");
     bool needs = grade_needs(g, text, sizeof text);
     size_t k;
     json_t *p;
     fprintf(f, "<tr%s><th scope=\"row\">", needs ? " class=\"bad\"" : "");
-    link_to(f, id, "staff.html", id);
+    link_to_staff(f, g);
     fputs("<br><small>", f);
-    link_to(f, id, "index.html", "student's page");
+    link_to(f, member_or_empty(g, "id"), "index.html", "student's page");
     fprintf(f, "</small></th><td class=\"num\">%.2f</td><td class=\"needs\">",
             member_number(g, "points"));
     if (needs)
@@ -132,9 +134,7 @@ static void row(FILE *f, const json_t *g, size_t parts)
     bugs_of(f, g);
     fputs("</td>", f);
     json_array_foreach(json_object_get(g, "parts"), k, p)
-    {
         fprintf(f, "<td class=\"num\">%.2f</td>", member_number(p, "points"));
-    }
     for (k = json_array_size(json_object_get(g, "parts")); k < parts; k++)
         fputs("<td></td>", f);
     fputs("</tr>\n", f);
@@ -153,8 +153,7 @@ static void table(FILE *f, json_t *const *sorted, size_t num)
         "<th scope=\"col\">submission</th><th scope=\"col\" class=\"num\">points</th>"
         "<th scope=\"col\">for you to look at</th><th scope=\"col\">what is wrong</th>",
         f);
-    json_array_foreach(parts, k, p)
-    {
+    json_array_foreach(parts, k, p) {
         html_print(f, "<th scope=\"col\" class=\"num\" title=\"%s\">Part&nbsp;%s</th>",
                    member_text(p, "title"), member_text(p, "number"));
     }
@@ -176,8 +175,7 @@ static void changes(FILE *f, json_t *const *sorted, size_t num)
         if (changed++ == 0)
             fputs("<h2>What changed</h2><ul>\n", f);
         fputs("<li>", f);
-        link_to(f, member_or_empty(sorted[i], "id"), "staff.html",
-                member_or_empty(sorted[i], "id"));
+        link_to_staff(f, sorted[i]);
         fprintf(f, ": %.2f of %g, ", member_number(sorted[i], "points"),
                 member_number(sorted[i], "of"));
         html_print(f, "%s</li>\n", text);
@@ -187,7 +185,7 @@ static void changes(FILE *f, json_t *const *sorted, size_t num)
 
 /* A text and how often it was met. */
 struct tally {
-    const char *text, *with;
+    const char *text;
     double num;
 };
 
@@ -212,8 +210,7 @@ static void common_bugs(FILE *f, const json_t *grades, struct tally *t)
 {
     size_t i, num = 0;
     json_t *g;
-    json_array_foreach(grades, i, g)
-    {
+    json_array_foreach(grades, i, g) {
         const json_t *first =
             json_array_get(json_object_get(json_object_get(g, "diagnosis"), "named"), 0);
         if (first != NULL)
@@ -232,8 +229,9 @@ static void slowest(FILE *f, const json_t *grades, struct tally *t)
 {
     size_t i, num = 0;
     json_t *g;
-    json_array_foreach(grades, i, g) t[num++] =
-        (struct tally){.text = member_or_empty(g, "id"), .num = member_number(g, "cpu_s")};
+    json_array_foreach(grades, i, g)
+        t[num++] =
+            (struct tally){.text = member_or_empty(g, "id"), .num = member_number(g, "cpu_s")};
     qsort(t, num, sizeof *t, by_num);
     fputs("<h2>Slowest</h2><table>\n", f);
     for (i = 0; i < num && i < SLOWEST; i++)
@@ -248,13 +246,11 @@ static void look_alikes(FILE *f, const json_t *grades)
     size_t i, k, m;
     json_t *g, *h, *p;
     bool any = false;
-    json_array_foreach(grades, i, g)
-    {
+    json_array_foreach(grades, i, g) {
         for (k = i + 1; k < json_array_size(grades); k++) {
             size_t same = 0, num = 0;
             h = json_array_get(grades, k);
-            json_array_foreach(json_object_get(g, "pictures"), m, p)
-            {
+            json_array_foreach(json_object_get(g, "pictures"), m, p) {
                 const char *a = member_or_empty(p, "sha256"),
                            *b = member_or_empty(json_array_get(json_object_get(h, "pictures"), m),
                                                 "sha256");
@@ -282,14 +278,11 @@ static void join_group(const json_t *grades, size_t i, int number, int *group)
     size_t k, m;
     json_t *like, *other;
     group[i] = number;
-    json_array_foreach(json_object_get(json_array_get(grades, i), "alike"), k, like)
-    {
+    json_array_foreach(json_object_get(json_array_get(grades, i), "alike"), k, like) {
         json_array_foreach(grades, m, other)
-        {
             if (group[m] == 0 &&
                 strcmp(member_or_empty(other, "id"), member_or_empty(like, "id")) == 0)
                 join_group(grades, m, number, group);
-        }
     }
 }
 
@@ -298,12 +291,11 @@ static void list_group(FILE *f, const json_t *grades, int number, const int *gro
     size_t i, members = 0;
     json_t *g;
     fputs("<li>", f);
-    json_array_foreach(grades, i, g)
-    {
+    json_array_foreach(grades, i, g) {
         if (group[i] != number)
             continue;
         fputs(members++ > 0 ? ", " : "", f);
-        link_to(f, member_or_empty(g, "id"), "staff.html", member_or_empty(g, "id"));
+        link_to_staff(f, g);
     }
     fputs("</li>\n", f);
 }
@@ -314,8 +306,7 @@ static void show_copies(FILE *f, const json_t *grades)
     bool any = false;
     size_t i;
     json_t *g;
-    json_array_foreach(grades, i, g)
-    {
+    json_array_foreach(grades, i, g) {
         const json_t *first = json_array_get(json_object_get(g, "copied"), 0);
         if (first == NULL)
             continue;
@@ -327,7 +318,7 @@ static void show_copies(FILE *f, const json_t *grades)
                 f);
         any = true;
         fputs("<li>", f);
-        link_to(f, member_or_empty(g, "id"), "staff.html", member_or_empty(g, "id"));
+        link_to_staff(f, g);
         html_print(f, ": %s</li>\n",
                    member_text(first, "picture") != NULL ? member_text(first, "picture")
                                                          : "all images together");
@@ -341,8 +332,7 @@ static void show_same_noise(FILE *f, const json_t *grades, int *group)
     int number = 0;
     size_t i;
     json_t *g;
-    json_array_foreach(grades, i, g)
-    {
+    json_array_foreach(grades, i, g) {
         if (group[i] > 0 || json_array_size(json_object_get(g, "alike")) == 0)
             continue;
         if (number == 0)
@@ -366,7 +356,8 @@ bool class_page(FILE *f, const json_t *grades, struct err *e)
     bool ok = (sorted != NULL && t != NULL && group != NULL) ||
               err_set(e, "out of memory for the page of the class");
     if (ok) {
-        json_array_foreach(grades, i, g) sorted[i] = g;
+        json_array_foreach(grades, i, g)
+            sorted[i] = g;
         qsort(sorted, num, sizeof(json_t *), by_urgency);
         html_page_open(f, "Grades", NULL, 0);
         html_print(f, "<div class=\"grade\">\n<h1>%s</h1>\n",

@@ -10,6 +10,7 @@
 #include "renderer/base/shell_quote.h"
 #include "renderer/base/version.h"
 #include "tools/base/hash_tree.h"
+#include "tools/base/text.h"
 
 #include <math.h>
 #include <pthread.h>
@@ -105,11 +106,10 @@ static json_t *image_json(const struct rubric *r, const struct submitted_images 
 /* Staff are told how far from a decision it is. */
 static void tell_provisional(struct result *result)
 {
-    size_t n = strlen(result->seen);
     if (result->more > 0)
-        snprintf(result->seen + n, sizeof result->seen - n,
-                 "; too noisy to be decided: it takes about %.2g times the samples",
-                 ceil(10 * result->more) / 10);
+        text_append(result->seen, sizeof result->seen,
+                    "; too noisy to be decided: it takes about %.2g times the samples",
+                    ceil(10 * result->more) / 10);
 }
 
 /* A submission that lost points for what it shows; an image that is not of the student's making looks like no bug. */

@@ -1,6 +1,7 @@
 #include "grade_change.h"
 
 #include "reference/base/json_node.h"
+#include "tools/base/text.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -31,14 +32,10 @@ json_t *grade_change(const json_t *old, const json_t *grade)
     size_t i;
     json_t *c, *list = json_array();
     json_array_foreach(json_object_get(grade, "checks"), i, c)
-    {
         compare(list, member_or_empty(c, "name"), find(old, member_or_empty(c, "name")), c);
-    }
     json_array_foreach(json_object_get(old, "checks"), i, c)
-    {
         if (find(grade, member_or_empty(c, "name")) == NULL)
             compare(list, member_or_empty(c, "name"), c, NULL);
-    }
     if (old == NULL || json_array_size(list) == 0) {
         json_decref(list);
         return NULL;
@@ -50,20 +47,18 @@ json_t *grade_change(const json_t *old, const json_t *grade)
 void grade_change_text(const json_t *grade, char *out, size_t size)
 {
     const json_t *before = json_object_get(grade, "before");
-    size_t i, n = 0;
+    size_t i;
     json_t *c;
     out[0] = '\0';
     if (json_is_object(before))
-        n = (size_t)snprintf(out, size, "%.2f of %g before", member_number(before, "points"),
-                             member_number(before, "of"));
-    json_array_foreach(json_object_get(before, "checks"), i, c)
-    {
+        text_append(out, size, "%.2f of %g before", member_number(before, "points"),
+                    member_number(before, "of"));
+    json_array_foreach(json_object_get(before, "checks"), i, c) {
         char was[32], is[32];
         snprintf(was, sizeof was, "%.2f", member_number(c, "was"));
         snprintf(is, sizeof is, "now %.2f", member_number(c, "is"));
-        if (n < size)
-            n += (size_t)snprintf(out + n, size - n, "; %s %s, %s", member_or_empty(c, "name"),
-                                  json_is_null(json_object_get(c, "was")) ? "not asked" : was,
-                                  json_is_null(json_object_get(c, "is")) ? "not asked now" : is);
+        text_append(out, size, "; %s %s, %s", member_or_empty(c, "name"),
+                    json_is_null(json_object_get(c, "was")) ? "not asked" : was,
+                    json_is_null(json_object_get(c, "is")) ? "not asked now" : is);
     }
 }

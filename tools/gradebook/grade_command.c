@@ -102,8 +102,7 @@ static size_t in_trouble(const json_t *grades, struct err *e)
 {
     size_t i, num = 0;
     json_t *g;
-    json_array_foreach(grades, i, g)
-    {
+    json_array_foreach(grades, i, g) {
         const char *why = json_string_value(json_object_get(g, "trouble"));
         if (why != NULL && num++ == 0)
             err_set(e, "%s: %s", member_or_empty(g, "id"), why);
@@ -116,8 +115,7 @@ static size_t need_staff(const json_t *grades)
 {
     size_t i, num = 0;
     json_t *g;
-    json_array_foreach(grades, i, g)
-    {
+    json_array_foreach(grades, i, g) {
         char text[8];
         num += grade_needs(g, text, sizeof text);
     }
@@ -132,9 +130,7 @@ static void warn_of_strangers(const char *file, const struct appeals *a, const j
         json_t *g;
         bool known = false;
         json_array_foreach(grades, k, g)
-        {
             known = known || strcmp(member_or_empty(g, "id"), a->of[i].id) == 0;
-        }
         if (!known)
             fprintf(stderr, "%s:%d: there is no submission '%s' here\n", file, a->of[i].line,
                     a->of[i].id);

@@ -1,6 +1,7 @@
 #include "grade_diagnose.h"
 
 #include "renderer/base/fs.h"
+#include "tools/base/text.h"
 #include "tools/diagnose/diagnose_gather.h"
 
 #include <math.h>
@@ -10,10 +11,8 @@
 
 static void join(const char *const *words, char *out, size_t size)
 {
-    size_t n = 0;
-    out[0] = '\0';
-    for (; words != NULL && *words != NULL && n < size; words++)
-        n += (size_t)snprintf(out + n, size - n, "%s ", *words);
+    for (out[0] = '\0'; words != NULL && *words != NULL; words++)
+        text_append(out, size, "%s ", *words);
 }
 
 static bool add_view(const struct view *v, const struct suite *suite, struct rubric *r,

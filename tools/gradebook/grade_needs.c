@@ -1,8 +1,8 @@
 #include "grade_needs.h"
 
 #include "reference/base/json_node.h"
+#include "tools/base/text.h"
 
-#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -17,10 +17,8 @@ static bool made_an_image(const json_t *grade)
     size_t i;
     json_t *p;
     json_array_foreach(images, i, p)
-    {
         if (json_is_string(json_object_get(p, "sha256")))
             return true;
-    }
     return json_array_size(images) == 0;
 }
 
@@ -39,26 +37,10 @@ bool grade_is_provisional(const json_t *object)
     size_t i;
     json_t *c;
     json_array_foreach(json_object_get(object, "checks"), i, c)
-    {
         if (grade_is_provisional(c))
             return true;
-    }
     return json_array_size(json_object_get(object, "checks")) == 0 &&
            json_is_true(json_object_get(object, "provisional"));
-}
-
-/* Appends it after what is there. */
-static void say(char *text, size_t size, const char *format, ...)
-    __attribute__((format(printf, 3, 4)));
-static void say(char *text, size_t size, const char *format, ...)
-{
-    size_t n = strlen(text);
-    va_list values;
-    va_start(values, format);
-    n += (size_t)snprintf(text + n, size - n, "%s", n > 0 ? "; " : "");
-    if (n < size)
-        vsnprintf(text + n, size - n, format, values);
-    va_end(values);
 }
 
 bool grade_needs(const json_t *grade, char *text, size_t size)
@@ -69,16 +51,16 @@ bool grade_needs(const json_t *grade, char *text, size_t size)
     json_t *c;
     text[0] = '\0';
     if (state != NULL || why != NULL)
-        say(text, size, "%s", why != NULL ? why : state);
-    json_array_foreach(json_object_get(grade, "checks"), i, c)
-    {
+        text_append(text, size, "%s", why != NULL ? why : state);
+    json_array_foreach(json_object_get(grade, "checks"), i, c) {
         const char *name = member_or_empty(c, "name"), *flag = member_or_empty(c, "flag");
-        if (flag[0] != '\0')
-            say(text, size, "%s: %s", name, flag);
-        if (!json_is_true(json_object_get(c, "judged")))
-            say(text, size, "%s: not judged", name);
-        if (grade_is_provisional(c))
-            say(text, size, "%s: provisional", name);
+        const char *const what[] = {flag[0] != '\0' ? flag : NULL,
+                                    json_is_true(json_object_get(c, "judged")) ? NULL
+                                                                               : "not judged",
+                                    grade_is_provisional(c) ? "provisional" : NULL};
+        for (int k = 0; k < 3; k++)
+            if (what[k] != NULL)
+                text_append(text, size, "%s%s: %s", text[0] != '\0' ? "; " : "", name, what[k]);
     }
     return text[0] != '\0';
 }

@@ -21,8 +21,7 @@ void grade_plot_difference(FILE *f, const json_t *check, double width, double he
         f,
         "<figure><svg width=\"%d\" viewBox=\"0 0 %g %g\" role=\"img\" aria-label=\"Tiles of the image by their difference\">",
         GRADE_SHOWN, width, height);
-    json_array_foreach(values, i, v)
-    {
+    json_array_foreach(values, i, v) {
         double d = json_number_value(v), strength = fmin(1, fabs(d) / 0.5);
         int other = (int)(255 * (1 - strength));
         double x = (double)(i % columns * GRADE_TILE), y = (double)(i / columns * GRADE_TILE);
@@ -74,7 +73,8 @@ void grade_plot_intervals(FILE *f, const json_t *check)
     size_t num = json_array_size(list), i;
     double most = 0;
     json_t *v;
-    json_array_foreach(list, i, v) most = fmax(most, 200 * member_number(v, "none"));
+    json_array_foreach(list, i, v)
+        most = fmax(most, 200 * member_number(v, "none"));
     if (num == 0 || !(most > 0))
         return;
     struct plot p = plot_sized(f, 312, ROW * (double)num);
@@ -86,7 +86,8 @@ void grade_plot_intervals(FILE *f, const json_t *check)
     p.y.hi = (double)num;
     fputs("<figure class=\"numbers\">", f);
     plot_open(&p, "Differences with their intervals, beside the margins");
-    json_array_foreach(list, i, v) draw_interval(&p, v, (double)(num - 1 - i));
+    json_array_foreach(list, i, v)
+        draw_interval(&p, v, (double)(num - 1 - i));
     plot_close(&p);
     fputs("<figcaption>by how much, with the noise of the image: all points while a bar touches "
           "green, none once it has left yellow</figcaption></figure>\n",

@@ -23,8 +23,7 @@ void grade_summary_bug(FILE *f, const json_t *grade)
         fprintf(f, "<div class=\"finding\"><p>This looks like %s:</p><ul>\n",
                 json_array_size(named) > 1 ? "one of these, which these images cannot tell apart"
                                            : "a known mistake");
-        json_array_foreach(named, i, b)
-        {
+        json_array_foreach(named, i, b) {
             html_print(f, "<li><b>%s</b> <span class=\"where\">(%s)</span>", member_text(b, "bug"),
                        member_text(b, "where"));
             if (member_text(b, "and_bug") != NULL)
@@ -57,8 +56,7 @@ static void list_losses(FILE *f, const json_t *grade, bool staff, const char *pa
 {
     size_t i;
     json_t *c;
-    json_array_foreach(json_object_get(grade, "checks"), i, c)
-    {
+    json_array_foreach(json_object_get(grade, "checks"), i, c) {
         double lost = member_number(c, "of") - member_number(c, "points");
         if (strcmp(member_or_empty(c, "part"), part) == 0 && grade_summary_shows(c, staff) &&
             lost >= 0.005)
@@ -76,16 +74,16 @@ void grade_summary_parts(FILE *f, const json_t *grade, bool staff)
     double most = 1e-9;
     size_t i;
     json_t *part;
-    json_array_foreach(parts, i, part) if (member_number(part, "of") > most) most =
-        member_number(part, "of");
+    json_array_foreach(parts, i, part)
+        if (member_number(part, "of") > most)
+            most = member_number(part, "of");
     if (json_array_size(parts) == 0)
         return;
     fputs(
         "<table class=\"parts\"><caption>Where the points went</caption>\n"
         "<thead><tr><th scope=\"col\">Part</th><th scope=\"col\" class=\"num\">Points</th></tr></thead><tbody>\n",
         f);
-    json_array_foreach(parts, i, part)
-    {
+    json_array_foreach(parts, i, part) {
         double of = member_number(part, "of"), points = member_number(part, "points");
         html_print(f, "<tr><th scope=\"row\">%s %s", member_text(part, "number"),
                    member_text(part, "title"));

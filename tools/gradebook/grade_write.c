@@ -5,6 +5,7 @@
 #include "reference/base/utc_date.h"
 #include "renderer/base/fs.h"
 #include "student_page.h"
+#include "tools/base/text.h"
 #include "tools/html/html.h"
 #include "tools/results/results.h"
 
@@ -32,30 +33,30 @@ static bool is_full(const json_t *check)
 /* What a student reads of a check. */
 static void describe(const json_t *c, char *out, size_t size)
 {
-    size_t n = 0;
+    const char *appeal = member_or_empty(c, "appeal"), *accepted = member_or_empty(c, "accepted"),
+               *hint = member_or_empty(c, "hint"), *where = member_or_empty(c, "where");
+    out[0] = '\0';
     if (grade_is_provisional(c))
-        n = (size_t)snprintf(
+        text_append(
             out, size,
             "Provisional: the samples did not suffice to decide this; the points are kept until staff have looked.\n");
     else if (!is_full(c) && member_number(c, "share") > 0)
-        n = (size_t)snprintf(out, size, "Partial credit: %.2f of %g points.\n",
-                             member_number(c, "points"), member_number(c, "of"));
-    n += (size_t)snprintf(out + n, size - n, "Expected: %s.\nSeen: %s.",
-                          member_or_empty(c, "expected"), member_or_empty(c, "seen"));
-    if (member_or_empty(c, "appeal")[0] != '\0' && n < size)
-        n +=
-            (size_t)snprintf(out + n, size - n, "\nDecided by staff: %s", member_text(c, "appeal"));
-    if (member_or_empty(c, "accepted")[0] != '\0' && n < size)
-        n += (size_t)snprintf(
-            out + n, size - n,
-            "\nExplained by what the starter code does (%s): no points lost for that.",
-            member_or_empty(c, "accepted"));
-    if (!is_full(c) && member_or_empty(c, "hint")[0] != '\0' && n < size)
-        n += (size_t)snprintf(out + n, size - n, "\nHint: %s", member_or_empty(c, "hint"));
-    if (!is_full(c) && member_or_empty(c, "where")[0] != '\0' && n < size)
-        n += (size_t)snprintf(out + n, size - n, "\nWhere: %s", member_or_empty(c, "where"));
-    if (!is_judged(c) && n < size)
-        snprintf(out + n, size - n, "\nNot judged: staff have to look at this.");
+        text_append(out, size, "Partial credit: %.2f of %g points.\n", member_number(c, "points"),
+                    member_number(c, "of"));
+    text_append(out, size, "Expected: %s.\nSeen: %s.", member_or_empty(c, "expected"),
+                member_or_empty(c, "seen"));
+    if (appeal[0] != '\0')
+        text_append(out, size, "\nDecided by staff: %s", appeal);
+    if (accepted[0] != '\0')
+        text_append(out, size,
+                    "\nExplained by what the starter code does (%s): no points lost for that.",
+                    accepted);
+    if (!is_full(c) && hint[0] != '\0')
+        text_append(out, size, "\nHint: %s", hint);
+    if (!is_full(c) && where[0] != '\0')
+        text_append(out, size, "\nWhere: %s", where);
+    if (!is_judged(c))
+        text_append(out, size, "\nNot judged: staff have to look at this.");
 }
 
 /* What is said of the submission as a whole, the bug's name with its place above all. */
@@ -63,29 +64,24 @@ static void describe_whole(const json_t *grade, char *out, size_t size)
 {
     const json_t *diagnosis = json_object_get(grade, "diagnosis");
     const char *located = member_or_empty(grade, "located");
-    size_t n = (size_t)snprintf(out, size, "%s%s%s", member_or_empty(grade, "trouble"),
-                                member_or_empty(grade, "wrong"),
-                                grade_is_provisional(grade)
-                                    ? "Some points are provisional, until staff have looked.\n"
-                                    : ""),
-           i;
+    size_t i;
     json_t *b;
-    if (located[0] != '\0' && n < size)
-        n += (size_t)snprintf(out + n, size - n, "What is wrong shows %s.\n", located);
-    else if (strcmp(member_or_empty(diagnosis, "finding"), "unknown") == 0 && n < size)
-        n += (size_t)snprintf(
-            out + n, size - n,
-            "Different from the right images in a way that no known bug explains.");
-    json_array_foreach(json_object_get(diagnosis, "named"), i, b)
-    {
+    snprintf(out, size, "%s%s%s", member_or_empty(grade, "trouble"),
+             member_or_empty(grade, "wrong"),
+             grade_is_provisional(grade) ? "Some points are provisional, until staff have looked.\n"
+                                         : "");
+    if (located[0] != '\0')
+        text_append(out, size, "What is wrong shows %s.\n", located);
+    else if (strcmp(member_or_empty(diagnosis, "finding"), "unknown") == 0)
+        text_append(out, size,
+                    "Different from the right images in a way that no known bug explains.");
+    json_array_foreach(json_object_get(diagnosis, "named"), i, b) {
         const char *and = member_or_empty(b, "and_bug");
-        if (n < size)
-            n += (size_t)snprintf(
-                out + n, size - n, "%s%s (%s)%s%s%s%s%s",
-                i == 0 ? "This looks like: " : "\nor: ", member_or_empty(b, "bug"),
-                member_or_empty(b, "where"), and[0] != '\0' ? ", and with it " : "", and,
-                and[0] != '\0' ? " (" : "", member_or_empty(b, "and_where"),
-                and[0] != '\0' ? ")" : "");
+        text_append(out, size, "%s%s (%s)",
+                    i == 0 ? "This looks like: " : "\nor: ", member_or_empty(b, "bug"),
+                    member_or_empty(b, "where"));
+        if (and[0] != '\0')
+            text_append(out, size, ", and with it %s (%s)", and, member_or_empty(b, "and_where"));
     }
 }
 
@@ -95,7 +91,8 @@ static double execution_time(const json_t *grade)
     double sum = 0;
     size_t i;
     json_t *p;
-    json_array_foreach(json_object_get(grade, "pictures"), i, p) sum += member_number(p, "wall_s");
+    json_array_foreach(json_object_get(grade, "pictures"), i, p)
+        sum += member_number(p, "wall_s");
     return sum;
 }
 
@@ -106,8 +103,7 @@ static json_t *gradescope(const json_t *grade)
     json_t *tests = json_array(), *root = json_object();
     size_t i;
     json_t *c;
-    json_array_foreach(json_object_get(grade, "checks"), i, c)
-    {
+    json_array_foreach(json_object_get(grade, "checks"), i, c) {
         char output[4096], name[400], number[32];
         describe(c, output, sizeof output);
         snprintf(name, sizeof name, "Part %s: %s", member_or_empty(c, "part"),
@@ -157,27 +153,21 @@ static void write_csv(FILE *f, const json_t *grades)
     size_t i, k;
     json_t *g, *c;
     json_array_foreach(grades, i, g)
-    {
         if (first == NULL && json_array_size(json_object_get(g, "checks")) > 0)
             first = g;
-    }
     fputs("id,points,of,remarks", f);
-    json_array_foreach(json_object_get(first, "checks"), k, c)
-    {
+    json_array_foreach(json_object_get(first, "checks"), k, c) {
         fputc(',', f);
         csv_link_text(f, member_or_empty(c, "name"));
     }
     fputs("\r\n", f);
-    json_array_foreach(grades, i, g)
-    {
+    json_array_foreach(grades, i, g) {
         csv_link_text(f, member_or_empty(g, "id"));
         fprintf(f, ",%.2f,%g,", member_number(g, "points"), member_number(g, "of"));
         csv_link_text(f, member_or_empty(g, "trouble")[0] != '\0' ? member_or_empty(g, "trouble")
                                                                   : member_or_empty(g, "wrong"));
         json_array_foreach(json_object_get(g, "checks"), k, c)
-        {
             fprintf(f, ",%.2f", member_number(c, "points"));
-        }
         fputs("\r\n", f);
     }
 }
@@ -193,15 +183,13 @@ static void write_tap(FILE *f, const json_t *grades)
 {
     size_t i, k, num = 0;
     json_t *g, *c;
-    json_array_foreach(grades, i, g)
-    {
+    json_array_foreach(grades, i, g) {
         size_t checks = json_array_size(json_object_get(g, "checks"));
         num += checks > 0 ? checks : 1;
     }
     fprintf(f, "TAP version 13\n1..%zu\n", num);
     num = 0;
-    json_array_foreach(grades, i, g)
-    {
+    json_array_foreach(grades, i, g) {
         if (json_array_size(json_object_get(g, "checks")) == 0) {
             fprintf(f, "not ok %zu - ", ++num);
             tap_text(f, member_or_empty(g, "id"));
@@ -209,8 +197,7 @@ static void write_tap(FILE *f, const json_t *grades)
             tap_text(f, member_or_empty(g, "trouble"));
             fputc('\n', f);
         }
-        json_array_foreach(json_object_get(g, "checks"), k, c)
-        {
+        json_array_foreach(json_object_get(g, "checks"), k, c) {
             fprintf(f, "%s %zu - ", is_full(c) ? "ok" : "not ok", ++num);
             tap_text(f, member_or_empty(g, "id"));
             fprintf(f, " %s (%.2f of %g): ", member_or_empty(c, "name"), member_number(c, "points"),
@@ -236,12 +223,10 @@ static void write_junit(FILE *f, const json_t *grades)
     char date[20]; /* without a zone */
     snprintf(date, sizeof date, "%.19s", utc_date_now().s);
     fputs("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n", f);
-    json_array_foreach(grades, i, g)
-    {
+    json_array_foreach(grades, i, g) {
         size_t failures = 0, errors = member_or_empty(g, "trouble")[0] != '\0',
                checks = json_array_size(json_object_get(g, "checks"));
-        json_array_foreach(json_object_get(g, "checks"), k, c)
-        {
+        json_array_foreach(json_object_get(g, "checks"), k, c) {
             failures += is_judged(c) && !is_full(c);
             errors += !is_judged(c);
         }
@@ -258,8 +243,7 @@ static void write_junit(FILE *f, const json_t *grades)
             xml_pair(f, "message", member_or_empty(g, "trouble"));
             fputs("/></testcase>\n", f);
         }
-        json_array_foreach(json_object_get(g, "checks"), k, c)
-        {
+        json_array_foreach(json_object_get(g, "checks"), k, c) {
             char output[4096];
             describe(c, output, sizeof output);
             fputs("<testcase", f);
@@ -282,7 +266,7 @@ static void write_junit(FILE *f, const json_t *grades)
 
 static bool write_json(const char *path, json_t *root, struct err *e)
 {
-    bool ok = (root != NULL || err_set(e, "out of memory")) && json_write(path, root, e);
+    bool ok = json_write(path, root, e);
     json_decref(root);
     return ok;
 }
@@ -335,8 +319,7 @@ bool grade_write(const char *out, const struct rubric *r, const struct answer_ke
     size_t i;
     json_t *g;
     bool ok = true;
-    json_array_foreach(grades, i, g)
-    {
+    json_array_foreach(grades, i, g) {
         ok = ok && write_json(fs_path("%s/%s/results.json", out, member_or_empty(g, "id")).s,
                               gradescope(g), e);
         for (int k = 0; ok && pages[k] != NULL; k++)

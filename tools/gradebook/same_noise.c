@@ -136,22 +136,13 @@ double same_noise_bound(double tests, double alpha)
     return sqrt(2 * log(fmax(1, tests) / alpha));
 }
 
-static int set_of(const struct rubric *r, const json_t *grade)
-{
-    int k = r->num_sets - 1;
-    while (k > 0 && strcmp(r->set[k].name, member_or_empty(grade, "accepted")) != 0)
-        k--;
-    return k;
-}
-
 /* Is it the image of an `equal` check, and did it cost no points? */
 static bool is_right(const json_t *grade, const char *image)
 {
     size_t i;
     json_t *c;
     bool asked = false;
-    json_array_foreach(json_object_get(grade, "checks"), i, c)
-    {
+    json_array_foreach(json_object_get(grade, "checks"), i, c) {
         if (strcmp(member_or_empty(c, "kind"), "equal") != 0 ||
             strcmp(member_or_empty(c, "picture"), image) != 0)
             continue;
@@ -201,7 +192,8 @@ static bool read_noise(const char *out, const struct rubric *r, const struct ans
         return true;
     if (!submitted_image_read(path, r->curve, p->width, p->height, &s, &why))
         return !err_is_of_memory(&why) || err_set(e, "%s", why.msg);
-    bool ok = same_noise_of(&s, answer_key_image(a, set_of(r, grade), i), p->spp, noise, e);
+    int set = answer_key_set(r, member_or_empty(grade, "accepted"));
+    bool ok = same_noise_of(&s, answer_key_image(a, set, i), p->spp, noise, e);
     const struct answer *plain = &a->of[0][i];
     double t = plain->twin.width > 0 ? same_noise_copy_t(&s, &plain->m, &plain->twin) : NAN;
     if (isfinite(t)) {

@@ -64,16 +64,10 @@ static const json_t *image_of(const json_t *grade, const char *name)
 static const struct moments *reference_of(const struct page *p, const char *name)
 {
     const struct rubric *r = p->rubric;
-    for (int i = 0; r != NULL && p->answers != NULL && i < r->num_images; i++) {
-        const struct moments *m = &p->answers->of[0][i].m;
-        if (strcmp(r->image[i].name, name) != 0)
-            continue;
-        for (int k = 1; k < r->num_sets; k++)
-            if (strcmp(r->set[k].name, member_or_empty(p->grade, "accepted")) == 0 &&
-                p->answers->of[k][i].m.width > 0)
-                m = &p->answers->of[k][i].m;
-        return m->width > 0 ? m : NULL;
-    }
+    for (int i = 0; r != NULL && p->answers != NULL && i < r->num_images; i++)
+        if (strcmp(r->image[i].name, name) == 0)
+            return answer_key_image(p->answers,
+                                    answer_key_set(r, member_or_empty(p->grade, "accepted")), i);
     return NULL;
 }
 
@@ -151,9 +145,7 @@ static bool show_checks(const struct page *p, bool out, struct err *e)
     json_t *c;
     bool ok = true;
     json_array_foreach(json_object_get(p->grade, "checks"), i, c)
-    {
         num += grade_summary_shows(c, p->staff) && stands_out(p, c) == out;
-    }
     if (num == 0)
         return true;
     if (out)
@@ -163,10 +155,8 @@ static bool show_checks(const struct page *p, bool out, struct err *e)
         fprintf(p->f, "<h2>What is right</h2><details><summary>%zu with all points</summary>\n",
                 num);
     json_array_foreach(json_object_get(p->grade, "checks"), i, c)
-    {
         if (grade_summary_shows(c, p->staff) && stands_out(p, c) == out)
             ok = ok && show_check(p, c, e);
-    }
     fputs(out ? "" : "</details>\n", p->f);
     return ok;
 }
@@ -222,8 +212,7 @@ static void show_runs(const struct page *p)
     size_t i;
     json_t *image;
     html_table_open(p->f, NULL, "Images", "image|>runs|>CPU, s|>wall, s|size|ended|said");
-    json_array_foreach(json_object_get(p->grade, "pictures"), i, image)
-    {
+    json_array_foreach(json_object_get(p->grade, "pictures"), i, image) {
         const char *end = member_or_empty(image, "end"), *why = member_or_empty(image, "why");
         bool ran = member_number(image, "wall_s") > 0;
         html_row_open(p->f, strcmp(end, "ok") != 0 || why[0] != '\0', member_text(image, "name"));
@@ -280,8 +269,8 @@ static bool page(const struct page *p, struct err *e)
     bool ok = show_image(p, member_or_empty(p->grade, "located_picture"), NULL, e);
     grade_summary_parts(p->f, p->grade, p->staff);
     ok = ok && show_checks(p, true, e) && show_checks(p, false, e);
-    json_array_foreach(json_object_get(p->grade, "checks"), i, c) left_out |=
-        !grade_summary_shows(c, p->staff);
+    json_array_foreach(json_object_get(p->grade, "checks"), i, c)
+        left_out |= !grade_summary_shows(c, p->staff);
     if (left_out)
         fputs("<p>Some checks are not shown yet.</p>\n", p->f);
     if (p->staff)

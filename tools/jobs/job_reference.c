@@ -186,11 +186,9 @@ static const json_t *entry_of(const struct plan *p, const struct suite_scene *sc
     size_t i;
     json_t *entry;
     json_array_foreach(json_object_get(p->head, "references"), i, entry)
-    {
         if (strcmp(member_text(entry, "scene"), scene->name) == 0 &&
             strcmp(member_text(entry, "engine"), ref->engine) == 0)
             return entry;
-    }
     return NULL;
 }
 

@@ -5,6 +5,7 @@
 #include "renderer/pathtracer/output.h"
 #include "renderer/pathtracer/checkpoint.h"
 #include "job_kinds.h"
+#include "tools/base/text.h"
 #include "tools/results/results.h"
 
 #include <stdio.h>
@@ -215,10 +216,10 @@ static bool write_whole(struct gathering *g, const struct output *out, struct er
 static char *ranges_text(const struct gathering *g)
 {
     enum { RANGE = 24 };
-    size_t n = 0, size = (size_t)g->plan->num * RANGE + 1;
+    size_t size = (size_t)g->plan->num * RANGE + 1;
     char *text = calloc(size, 1);
     for (const struct part *p = g->part; text != NULL; p++) {
-        n += (size_t)snprintf(text + n, size - n, "%s%d:%d", n > 0 ? "," : "", p->first, p->last);
+        text_append(text, size, "%s%d:%d", text[0] != '\0' ? "," : "", p->first, p->last);
         if (p->last == g->o->last)
             break;
     }

@@ -65,8 +65,7 @@ static bool check_inputs(json_t *inputs, struct err *e)
     const char *path;
     json_t *planned;
     char hex[65];
-    json_object_foreach(inputs, path, planned)
-    {
+    json_object_foreach(inputs, path, planned) {
         if (!hash_tree(path, NULL, hex, e))
             return err_prefix(e, "an input");
         if (json_string_value(planned) == NULL || strcmp(hex, json_string_value(planned)) != 0)
@@ -84,8 +83,7 @@ static char **command_of(const struct plan *p, const json_t *job, const char *ou
            *all = json_array(), *v;
     size_t i;
     int num, failed = 0;
-    json_array_foreach(run, i, v)
-    {
+    json_array_foreach(run, i, v) {
         const char *word = json_string_value(v);
         char path[2 * ROOM];
         if (strcmp(word, "{job}") == 0) {
@@ -107,10 +105,8 @@ static bool may_end(const struct plan *p, int code)
     size_t i;
     json_t *v;
     json_array_foreach(json_object_get(p->head, "ends"), i, v)
-    {
         if (json_integer_value(v) == code)
             return true;
-    }
     return false;
 }
 

@@ -119,8 +119,7 @@ static void add_new(json_t *all, json_t *more)
     const char *scene = json_string_value(json_object_get(last, "scene"));
     size_t i;
     json_t *entry;
-    json_array_foreach(more, i, entry)
-    {
+    json_array_foreach(more, i, entry) {
         const char *of = json_string_value(json_object_get(entry, "scene"));
         if (scene == NULL || of == NULL || strcmp(scene, of) != 0)
             json_array_append(all, entry);

@@ -194,9 +194,7 @@ bool plan_are_texts(const json_t *array)
     size_t i;
     json_t *v;
     json_array_foreach(array, i, v)
-    {
         if (!json_is_string(v))
             return false;
-    }
     return json_is_array(array);
 }

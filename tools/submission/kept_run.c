@@ -3,6 +3,7 @@
 #include "reference/base/json_file.h"
 #include "reference/base/json_node.h"
 #include "renderer/base/sha256.h"
+#include "tools/base/text.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -16,16 +17,16 @@ bool kept_run_path(const char *store, const char *of, const struct sandbox *s,
 {
     char text[TEXT], key[65];
     const struct sandbox_limits *l = &job->limit;
-    size_t n = (size_t)snprintf(text, sizeof text, "%s %d %g %g %zu %zu %zu %d", of, s->unsafe,
-                                l->wall_s, l->cpu_s, l->memory, l->disk, l->file, l->processes);
-    for (; *inputs != NULL && n < sizeof text; inputs++) {
+    snprintf(text, sizeof text, "%s %d %g %g %zu %zu %zu %d", of, s->unsafe, l->wall_s, l->cpu_s,
+             l->memory, l->disk, l->file, l->processes);
+    for (; *inputs != NULL; inputs++) {
         if (!sha256_file(fs_path("%s/%s", job->scene, *inputs).s, key, e))
             return false;
-        n += (size_t)snprintf(text + n, sizeof text - n, " %s", key);
+        text_append(text, sizeof text, " %s", key);
     }
-    for (const char *const *word = job->argv; *word != NULL && n < sizeof text; word++)
-        n += (size_t)snprintf(text + n, sizeof text - n, "\n%s", *word);
-    if (n >= sizeof text)
+    for (const char *const *word = job->argv; *word != NULL; word++)
+        text_append(text, sizeof text, "\n%s", *word);
+    if (strlen(text) == sizeof text - 1)
         return err_set(e, "the command of '%s' is too long", job->argv[0]);
     sha256_text(text, key);
     *dir = fs_path("%s/%s", store, key);
@@ -69,8 +70,7 @@ bool kept_run_write(const char *dir, const struct sandbox_job *job,
     json_t *run =
         json_pack("{si, si, sf, sf, ss}", "end", (int)result->end, "status", result->status,
                   "wall_s", result->wall_s, "cpu_s", result->cpu_s, "why", result->why);
-    bool ok = (run != NULL || err_set(e, "out of memory")) && fs_remove_tree(dir, e) &&
-              fs_make_dirs(dir, e) && copy_all(job, job->out, dir, e) &&
+    bool ok = fs_remove_tree(dir, e) && fs_make_dirs(dir, e) && copy_all(job, job->out, dir, e) &&
               fs_copy(job->log, fs_path("%s/log", dir).s, e) &&
               json_write(fs_path("%s/run.json", dir).s, run, e);
     json_decref(run);

@@ -5,6 +5,7 @@
 #include "renderer/base/cli.h"
 
 #include <errno.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -161,15 +162,28 @@ static void read_mask(struct statement *s)
         take_int(s, "mask", i < 2 ? 0 : 1, 4096, &s->r->mask[i]);
 }
 
+static void read_bugs(struct statement *s)
+{
+    if (s->r->bugs[0] != '\0')
+        rubric_mistake(s->m, s->line, "a second 'bugs'");
+    take_name(s, "bugs", s->r->bugs, sizeof s->r->bugs);
+}
+
+/* An image, a part or a check begins. False: there are too many. */
+static bool begin(struct statement *s, const char *what, int num, int most)
+{
+    s->check = NULL;
+    s->image = NULL;
+    if (num == most)
+        rubric_mistake(s->m, s->line, "more than %d %s", most, what);
+    return num < most;
+}
+
 static void read_image(struct statement *s)
 {
     struct rubric *r = s->r;
-    s->check = NULL;
-    s->image = NULL;
-    if (r->num_images == RUBRIC_IMAGES) {
-        rubric_mistake(s->m, s->line, "more than %d images", RUBRIC_IMAGES);
+    if (!begin(s, "images", r->num_images, RUBRIC_IMAGES))
         return;
-    }
     struct rubric_image *p = &r->image[r->num_images];
     *p = (struct rubric_image){.line = s->line, .lights = 1, .bounces = -1};
     s->image = p;
@@ -182,15 +196,18 @@ static void read_image(struct statement *s)
     r->num_images++;
 }
 
+/* By its old word. */
+static void read_picture(struct statement *s)
+{
+    s->r->old_word_line = s->r->old_word_line > 0 ? s->r->old_word_line : s->line;
+    read_image(s);
+}
+
 static void read_part(struct statement *s)
 {
     struct rubric *r = s->r;
-    s->check = NULL;
-    s->image = NULL;
-    if (r->num_parts == RUBRIC_PARTS) {
-        rubric_mistake(s->m, s->line, "more than %d parts", RUBRIC_PARTS);
+    if (!begin(s, "parts", r->num_parts, RUBRIC_PARTS))
         return;
-    }
     struct rubric_part *p = &r->part[r->num_parts++];
     *p = (struct rubric_part){.line = s->line};
     take_name(s, "part", p->number, sizeof p->number);
@@ -211,12 +228,8 @@ static bool take_image(struct statement *s, int *out)
 static void read_check(struct statement *s)
 {
     struct rubric *r = s->r;
-    s->check = NULL;
-    s->image = NULL;
-    if (r->num_checks == RUBRIC_CHECKS) {
-        rubric_mistake(s->m, s->line, "more than %d checks", RUBRIC_CHECKS);
+    if (!begin(s, "checks", r->num_checks, RUBRIC_CHECKS))
         return;
-    }
     struct rubric_check *c = &r->check[r->num_checks++];
     *c = (struct rubric_check){.line = s->line, .part = r->num_parts - 1, .after = -1};
     s->check = c;
@@ -251,8 +264,15 @@ static void read_check(struct statement *s)
     }
 }
 
-static void read_reference(struct statement *s, struct rubric_image *p)
+static void read_size(struct statement *s)
 {
+    take_int(s, "size", 16, 4096, &s->image->width);
+    take_int(s, "size", 16, 4096, &s->image->height);
+}
+
+static void read_reference(struct statement *s)
+{
+    struct rubric_image *p = s->image;
     char *kind = take_word(s);
     if (p->reference != REFERENCE_NONE)
         rubric_mistake(s->m, s->line, "a second 'reference'");
@@ -270,8 +290,11 @@ static void read_reference(struct statement *s, struct rubric_image *p)
     }
 }
 
-static void read_accept(struct statement *s, struct accepted *list, int most, int *num)
+static void read_accept(struct statement *s)
 {
+    struct accepted *list = s->image != NULL ? s->image->accept : s->r->accept;
+    int most = s->image != NULL ? RUBRIC_SETS : RUBRIC_ACCEPTED,
+        *num = s->image != NULL ? &s->image->num_accepted : &s->r->num_accepted;
     if (*num == most) {
         rubric_mistake(s->m, s->line, "more than %d accepted deviations", most);
         return;
@@ -286,66 +309,6 @@ static void read_accept(struct statement *s, struct accepted *list, int most, in
             rubric_mistake(s->m, s->line, "'%s' is already accepted in line %d", a->name,
                            list[i].line);
     ++*num;
-}
-
-/* False: no statement of an image. */
-static bool read_in_image(struct statement *s, const char *word)
-{
-    struct rubric_image *p = s->image;
-    if (strcmp(word, "scene") == 0)
-        take_text(s, word, p->scene, sizeof p->scene);
-    else if (strcmp(word, "size") == 0) {
-        take_int(s, word, 16, 4096, &p->width);
-        take_int(s, word, 16, 4096, &p->height);
-    } else if (strcmp(word, "spp") == 0)
-        take_int(s, word, 1, 1 << 20, &p->spp);
-    else if (strcmp(word, "lights") == 0)
-        take_int(s, word, 1, 1 << 20, &p->lights);
-    else if (strcmp(word, "bounces") == 0)
-        take_int(s, word, 0, 1000, &p->bounces);
-    else if (strcmp(word, "options") == 0)
-        take_text(s, word, p->options, sizeof p->options);
-    else if (strcmp(word, "environment") == 0)
-        take_text(s, word, p->environment, sizeof p->environment);
-    else if (strcmp(word, "reference") == 0)
-        read_reference(s, p);
-    else if (strcmp(word, "accept") == 0)
-        read_accept(s, p->accept, RUBRIC_SETS, &p->num_accepted);
-    else
-        return false;
-    return true;
-}
-
-static bool read_in_check(struct statement *s, const char *word)
-{
-    struct rubric_check *c = s->check;
-    if (strcmp(word, "image") == 0)
-        take_margin(s, word, &c->image);
-    else if (strcmp(word, "tile") == 0)
-        take_margin(s, word, &c->tile);
-    else if (strcmp(word, "count") == 0)
-        take_margin(s, word, &c->count);
-    else if (strcmp(word, "share") == 0)
-        take_margin(s, word, &c->share);
-    else if (strcmp(word, "ratio") == 0) {
-        take_margin(s, word, &c->log_ratio);
-    } else if (strcmp(word, "carried") == 0)
-        take_margin(s, word, &c->carried);
-    else if (strcmp(word, "after") == 0)
-        take_image(s, &c->after);
-    else if (strcmp(word, "batch") == 0)
-        take_int(s, word, 1, 1 << 20, &c->batch);
-    else if (strcmp(word, "title") == 0)
-        take_text(s, word, c->title, sizeof c->title);
-    else if (strcmp(word, "hint") == 0)
-        take_text(s, word, c->hint, sizeof c->hint);
-    else if (strcmp(word, "where") == 0)
-        take_text(s, word, c->where, sizeof c->where);
-    else if (strcmp(word, "visibility") == 0)
-        take_text(s, word, c->visibility, sizeof c->visibility);
-    else
-        return false;
-    return true;
 }
 
 /* Once, before what depends on it. */
@@ -380,54 +343,91 @@ static void fill_in_variant(struct statement *s, const char *word)
     }
 }
 
+/* A statement that fills a member of the rubric, or of the image or check that it stands in; `read`: all others. */
+struct member {
+    const char *word;
+    enum { TEXT, WHOLE, NUMBER, MARGIN, IMAGE } value;
+    size_t at, size;
+    int lo, hi; /* of numbers */
+    void (*read)(struct statement *s);
+};
+#define TO(type, name) .at = offsetof(struct type, name), .size = sizeof((struct type *)NULL)->name
+
+static const struct member of_rubric[] = {{"rubric", TEXT, TO(rubric, title)},
+                                          {"variants", .read = read_variants},
+                                          {"curve", TEXT, TO(rubric, curve)},
+                                          {"command", TEXT, TO(rubric, command)},
+                                          {"diagnose", TEXT, TO(rubric, diagnose)},
+                                          {"bugs", .read = read_bugs},
+                                          {"output", TEXT, TO(rubric, output)},
+                                          {"program", TEXT, TO(rubric, program)},
+                                          {"build", .read = read_build},
+                                          {"packages", TEXT, TO(rubric, packages)},
+                                          {"total", NUMBER, TO(rubric, total), 0, 1000000},
+                                          {"limit", .read = read_limit},
+                                          {"budget", .read = read_budget},
+                                          {"mask", .read = read_mask},
+                                          {"picture", .read = read_picture},
+                                          {"part", .read = read_part},
+                                          {"check", .read = read_check},
+                                          {0}};
+static const struct member of_image[] = {{"scene", TEXT, TO(rubric_image, scene)},
+                                         {"size", .read = read_size},
+                                         {"spp", WHOLE, TO(rubric_image, spp), 1, 1 << 20},
+                                         {"lights", WHOLE, TO(rubric_image, lights), 1, 1 << 20},
+                                         {"bounces", WHOLE, TO(rubric_image, bounces), 0, 1000},
+                                         {"options", TEXT, TO(rubric_image, options)},
+                                         {"environment", TEXT, TO(rubric_image, environment)},
+                                         {"reference", .read = read_reference},
+                                         {"accept", .read = read_accept},
+                                         {0}};
+static const struct member of_check[] = {{"image", MARGIN, TO(rubric_check, image)},
+                                         {"tile", MARGIN, TO(rubric_check, tile)},
+                                         {"count", MARGIN, TO(rubric_check, count)},
+                                         {"share", MARGIN, TO(rubric_check, share)},
+                                         {"ratio", MARGIN, TO(rubric_check, log_ratio)},
+                                         {"carried", MARGIN, TO(rubric_check, carried)},
+                                         {"after", IMAGE, TO(rubric_check, after)},
+                                         {"batch", WHOLE, TO(rubric_check, batch), 1, 1 << 20},
+                                         {"title", TEXT, TO(rubric_check, title)},
+                                         {"hint", TEXT, TO(rubric_check, hint)},
+                                         {"where", TEXT, TO(rubric_check, where)},
+                                         {"visibility", TEXT, TO(rubric_check, visibility)},
+                                         {0}};
+
+/* False: none of these statements. */
+static bool read_member(struct statement *s, const struct member *m, void *object, const char *word)
+{
+    while (m->word != NULL && strcmp(m->word, word) != 0)
+        m++;
+    if (object == NULL || m->word == NULL)
+        return false;
+    void *to = (char *)object + m->at;
+    if (m->read != NULL)
+        m->read(s);
+    else if (m->value == TEXT)
+        take_text(s, word, to, m->size);
+    else if (m->value == WHOLE)
+        take_int(s, word, m->lo, m->hi, to);
+    else if (m->value == NUMBER)
+        take_number(s, word, m->lo, m->hi, to);
+    else if (m->value == MARGIN)
+        take_margin(s, word, to);
+    else
+        take_image(s, to);
+    return true;
+}
+
 static void read_statement(struct statement *s)
 {
-    struct rubric *r = s->r;
     char *word = take_word(s);
     fill_in_variant(s, word);
-    if (strcmp(word, "rubric") == 0)
-        take_text(s, word, r->title, sizeof r->title);
-    else if (strcmp(word, "variants") == 0)
-        read_variants(s);
-    else if (strcmp(word, "curve") == 0)
-        take_text(s, word, r->curve, sizeof r->curve);
-    else if (strcmp(word, "command") == 0)
-        take_text(s, word, r->command, sizeof r->command);
-    else if (strcmp(word, "diagnose") == 0)
-        take_text(s, word, r->diagnose, sizeof r->diagnose);
-    else if (strcmp(word, "bugs") == 0) {
-        if (r->bugs[0] != '\0')
-            rubric_mistake(s->m, s->line, "a second 'bugs'");
-        take_name(s, word, r->bugs, sizeof r->bugs);
-    } else if (strcmp(word, "output") == 0)
-        take_text(s, word, r->output, sizeof r->output);
-    else if (strcmp(word, "program") == 0)
-        take_text(s, word, r->program, sizeof r->program);
-    else if (strcmp(word, "build") == 0)
-        read_build(s);
-    else if (strcmp(word, "packages") == 0)
-        take_text(s, word, r->packages, sizeof r->packages);
-    else if (strcmp(word, "total") == 0)
-        take_number(s, word, 0, 1e6, &r->total);
-    else if (strcmp(word, "limit") == 0)
-        read_limit(s);
-    else if (strcmp(word, "budget") == 0)
-        read_budget(s);
-    else if (strcmp(word, "mask") == 0)
-        read_mask(s);
-    else if (strcmp(word, "accept") == 0 && s->image == NULL && s->check == NULL)
-        read_accept(s, r->accept, RUBRIC_ACCEPTED, &r->num_accepted);
-    else if (strcmp(word, "picture") == 0) {
-        r->old_word_line = r->old_word_line > 0 ? r->old_word_line : s->line;
-        read_image(s);
-    } else if (strcmp(word, "image") == 0 && (s->check == NULL || is_name(s->rest)))
+    if (strcmp(word, "accept") == 0 && s->image == NULL && s->check == NULL)
+        read_accept(s);
+    else if (strcmp(word, "image") == 0 && (s->check == NULL || is_name(s->rest)))
         read_image(s); /* a check's margin of that name is two numbers, which are no name */
-    else if (strcmp(word, "part") == 0)
-        read_part(s);
-    else if (strcmp(word, "check") == 0)
-        read_check(s);
-    else if (!(s->image != NULL && read_in_image(s, word)) &&
-             !(s->check != NULL && read_in_check(s, word))) {
+    else if (!read_member(s, of_rubric, s->r, word) && !read_member(s, of_image, s->image, word) &&
+             !read_member(s, of_check, s->check, word)) {
         rubric_mistake(s->m, s->line, "'%s' is no statement %s", word,
                        s->image != NULL   ? "of an image"
                        : s->check != NULL ? "of a check"

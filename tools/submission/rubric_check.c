@@ -2,6 +2,7 @@
 #include "renderer/base/fs.h"
 
 #include "reference/truth/truth.h"
+#include "tools/base/text.h"
 #include "tools/images/tone_curve.h"
 
 #include <math.h>
@@ -269,8 +270,7 @@ static void check_check(const struct rubric *r, struct rubric_check *c, struct r
 
 static void append(char *text, size_t size, const char *between, const char *more)
 {
-    size_t n = strlen(text);
-    snprintf(text + n, size - n, "%s%s", n > 0 ? between : "", more);
+    text_append(text, size, "%s%s", text[0] != '\0' ? between : "", more);
 }
 
 /* Every choice of those by words, then those that images show. */
