@@ -105,10 +105,9 @@ bool job_grade_plan(int argc, char **argv, const struct plan_wishes *w, struct p
 static bool place(const struct plan *p, int k, const char *out, const char *submission,
                   struct err *e)
 {
-    char id[128], artefact[PLAN_PATH + 256];
+    char id[128];
     submission_id(submission, id);
-    job_run_artefact(p, k, NULL, artefact);
-    const struct path from = fs_path("%s/%s", artefact, id);
+    const struct path from = job_run_artefact(p, k, id);
     const struct path to = fs_path("%s/%s", out, id);
     const struct path temp = fs_path("%s/.%s.tmp%ld", out, id, (long)getpid());
     if (!job_run_verify(p, k, e))

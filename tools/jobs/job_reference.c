@@ -195,26 +195,22 @@ static const json_t *entry_of(const struct plan *p, const struct suite_scene *sc
 /* The artefacts of jobs first .. first+num-1, whole: an array of paths, then the paths; to free(). */
 static const char **artefacts(const struct plan *p, int first, int num, struct err *e)
 {
-    enum { ROOM = PLAN_PATH + 256 };
     if (first < 0 || num < 1 || num > p->num - first) {
         err_set(e, "%s/plan.jsonl: no such jobs of a reference", p->dir);
         return NULL;
     }
-    const char **dir = malloc((size_t)num * (sizeof *dir + ROOM));
-    if (dir == NULL) {
-        err_set(e, "out of memory");
-        return NULL;
+    const char **dir = malloc((size_t)num * (sizeof *dir + sizeof(struct path)));
+    struct path *path = (struct path *)(void *)(dir + num);
+    bool ok = dir != NULL || err_set(e, "out of memory");
+    for (int i = 0; ok && i < num; i++) {
+        path[i] = job_run_artefact(p, first + i, NULL);
+        dir[i] = path[i].s;
+        ok = job_run_verify(p, first + i, e);
     }
-    char *at = (char *)(dir + num);
-    for (int i = 0; i < num; i++, at += ROOM) {
-        if (!job_run_verify(p, first + i, e)) {
-            free(dir);
-            return NULL;
-        }
-        job_run_artefact(p, first + i, NULL, at);
-        dir[i] = at;
-    }
-    return dir;
+    if (ok)
+        return dir;
+    free(dir);
+    return NULL;
 }
 
 static bool gather_one(const struct gathering *g, const json_t *entry,

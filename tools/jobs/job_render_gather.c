@@ -34,19 +34,18 @@ static bool open_part(struct gathering *g, int k, struct err *e)
 {
     struct part *part = &g->part[k];
     const struct options *o = g->o;
-    char path[PLAN_PATH + 256];
+    const struct path path = job_run_artefact(g->plan, k, plan_text(g->plan, "product"));
     struct render_id id = g->id;
     const int cell[4] = {o->cell[0] + part->x, o->cell[1] + o->cell[3] - part->y - part->height,
                          part->width, part->height};
-    job_run_artefact(g->plan, k, plan_text(g->plan, "product"), path);
     render_id_cell(cell, o->width, o->height, id.cell);
     id.first_sample = (uint32_t)part->first;
     part->state = calloc(1, sizeof *part->state);
     if (part->state == NULL)
         return err_set(e, "out of memory");
-    return checkpoint_open(part->state, path, &id, part->width, part->height, o->aov, e) &&
+    return checkpoint_open(part->state, path.s, &id, part->width, part->height, o->aov, e) &&
            (o->pilot_tolerance < 0 || part->state->has_target ||
-            err_set(e, "%s: its pilot has decided nothing", path));
+            err_set(e, "%s: its pilot has decided nothing", path.s));
 }
 
 static void close_part(struct part *part)

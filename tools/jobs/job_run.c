@@ -12,8 +12,6 @@
 #include <unistd.h>
 
 #define RECEIPT "job.json"
-enum { ROOM = PLAN_PATH + 256 };
-
 static json_t *job_of(const struct plan *p, int k)
 {
     return json_loads(p->line[k], 0, NULL);
@@ -28,34 +26,31 @@ static void key_of(const json_t *job, char key[65])
         strcpy(key, text);
 }
 
-void job_run_artefact(const struct plan *p, int k, const char *name, char path[ROOM])
+struct path job_run_artefact(const struct plan *p, int k, const char *name)
 {
     char key[65];
     json_t *job = job_of(p, k);
     key_of(job, key);
     json_decref(job);
-    snprintf(path, ROOM, "%s/jobs/%s%s%s", p->dir, key, name != NULL ? "/" : "",
-             name != NULL ? name : "");
+    return fs_path("%s/jobs/%s%s%s", p->dir, key, name != NULL ? "/" : "",
+                   name != NULL ? name : "");
 }
 
 bool job_run_is_made(const struct plan *p, int k)
 {
-    char path[ROOM];
-    job_run_artefact(p, k, RECEIPT, path);
-    return access(path, R_OK) == 0;
+    return access(job_run_artefact(p, k, RECEIPT).s, R_OK) == 0;
 }
 
 bool job_run_verify(const struct plan *p, int k, struct err *e)
 {
-    char path[ROOM], hex[65];
-    job_run_artefact(p, k, RECEIPT, path);
-    json_t *receipt = json_load_file(path, 0, NULL);
+    char hex[65];
+    const struct path made = job_run_artefact(p, k, NULL), path = job_run_artefact(p, k, RECEIPT);
+    json_t *receipt = json_load_file(path.s, 0, NULL);
     const char *sha256 = json_string_value(json_object_get(receipt, "sha256"));
-    bool ok = sha256 != NULL || err_set(e, "job %d: %s is not there", k, path);
-    job_run_artefact(p, k, NULL, path);
-    ok = ok && hash_tree(path, RECEIPT, hex, e);
-    if (ok && strcmp(hex, sha256) != 0)
-        ok = err_set(e, "job %d: %s is not what the job wrote", k, path);
+    bool ok =
+        (sha256 != NULL || err_set(e, "job %d: %s is not there", k, path.s)) &&
+        hash_tree(made.s, RECEIPT, hex, e) &&
+        (strcmp(hex, sha256) == 0 || err_set(e, "job %d: %s is not what the job wrote", k, made.s));
     json_decref(receipt);
     return ok;
 }
@@ -82,18 +77,15 @@ static char **command_of(const struct plan *p, const json_t *job, const char *ou
     json_t *run = json_object_get(p->head, "run"), *own = json_object_get(job, "words"),
            *all = json_array(), *v;
     size_t i;
-    int num, failed = 0;
+    int num, failed = 0; /* where the path is no UTF-8 */
     json_array_foreach(run, i, v) {
         const char *word = json_string_value(v);
-        char path[2 * ROOM];
-        if (strcmp(word, "{job}") == 0) {
-            failed |= json_array_extend(all, own);
-        } else if (strncmp(word, "{out}", 5) == 0) {
-            snprintf(path, sizeof path, "%s%s", out, word + 5);
-            failed |= json_array_append_new(all, json_string(path));
-        } else {
-            failed |= json_array_append(all, v);
-        }
+        if (strcmp(word, "{job}") == 0)
+            json_array_extend(all, own);
+        else if (strncmp(word, "{out}", 5) == 0)
+            failed |= json_array_append_new(all, json_string(fs_path("%s%s", out, word + 5).s));
+        else
+            json_array_append(all, v);
     }
     char **words = failed == 0 ? plan_words(all, &num) : NULL;
     json_decref(all);
@@ -114,18 +106,18 @@ static bool may_end(const struct plan *p, int code)
 static bool make(const struct plan *p, int k, const json_t *job, const char *key, const char *out,
                  struct err *e)
 {
-    char log[2 * ROOM], path[2 * ROOM], hex[65], host[256] = "";
+    char hex[65], host[256] = "";
+    const struct path log = fs_path("%s/log", out),
+                      product = fs_path("%s/%s", out, plan_text(p, "product"));
     struct process_usage usage = {.exit_status = -1};
     struct err why = {""};
     char **words = command_of(p, job, out);
     if (words == NULL)
         return err_set(e, "out of memory");
-    snprintf(log, sizeof log, "%s/log", out);
-    const struct process process = {.argv = (const char *const *)words, .log = log};
+    const struct process process = {.argv = (const char *const *)words, .log = log.s};
     bool ok = process_run(&process, &usage, &why) || may_end(p, usage.exit_status);
     free(words);
-    snprintf(path, sizeof path, "%s/%s", out, plan_text(p, "product"));
-    if (!ok || access(path, R_OK) != 0)
+    if (!ok || access(product.s, R_OK) != 0)
         return err_set(e, "job %d: %s", k, why.msg[0] != '\0' ? why.msg : "it left no artefact");
     gethostname(host, sizeof host - 1);
     if (!hash_tree(out, RECEIPT, hex, e))
@@ -133,8 +125,7 @@ static bool make(const struct plan *p, int k, const json_t *job, const char *key
     json_t *receipt =
         json_pack("{ss, ss, ss, si, sf, sf}", "key", key, "sha256", hex, "host", host, "exit",
                   usage.exit_status, "cpu_s", usage.cpu_s, "wall_s", usage.wall_s);
-    snprintf(path, sizeof path, "%s/" RECEIPT, out);
-    ok = json_write(path, receipt, e);
+    ok = json_write(fs_path("%s/" RECEIPT, out).s, receipt, e);
     json_decref(receipt);
     return ok;
 }
@@ -142,19 +133,18 @@ static bool make(const struct plan *p, int k, const json_t *job, const char *key
 /* Two that made the same job have made the same: the second goes. */
 static bool put_in_place(const struct plan *p, int k, const char *from, struct err *e)
 {
-    char to[ROOM];
-    job_run_artefact(p, k, NULL, to);
-    if (rename(from, to) == 0)
+    const struct path to = job_run_artefact(p, k, NULL);
+    if (rename(from, to.s) == 0)
         return true;
     int why = errno;
     if ((why == EEXIST || why == ENOTEMPTY) && job_run_is_made(p, k))
         return fs_remove_tree(from, e);
-    return err_set(e, "%s: cannot appear: %s", to, strerror(why));
+    return err_set(e, "%s: cannot appear: %s", to.s, strerror(why));
 }
 
 bool job_run(const struct plan *p, int k, bool *made, struct err *e)
 {
-    char path[ROOM], out[ROOM + 300], key[65], host[256] = "";
+    char key[65], host[256] = "";
     struct err why = {""};
     json_t *job = job_of(p, k);
     key_of(job, key);
@@ -163,21 +153,20 @@ bool job_run(const struct plan *p, int k, bool *made, struct err *e)
         json_decref(job);
         return err_set(e, "%s/plan.jsonl: line %d is no job", p->dir, k + 2);
     }
-    job_run_artefact(p, k, NULL, path);
     if (job_run_is_made(p, k) && job_run_verify(p, k, &why)) {
         json_decref(job);
         return true;
     }
     gethostname(host, sizeof host - 1);
-    snprintf(out, sizeof out, "%s.tmp-%s-%ld", path, host, (long)getpid());
+    const struct path path = job_run_artefact(p, k, NULL),
+                      out = fs_path("%s.tmp-%s-%ld", path.s, host, (long)getpid());
     bool ok = check_inputs(json_object_get(p->head, "inputs"), e) &&
-              check_inputs(json_object_get(job, "inputs"), e) && fs_remove_tree(out, e) &&
-              fs_make_dirs(out, e) && make(p, k, job, key, out, e);
-    if (ok && why.msg[0] != '\0') /* there is one, but it is not whole */
-        ok = fs_remove_tree(path, e);
-    ok = ok && put_in_place(p, k, out, e);
+              check_inputs(json_object_get(job, "inputs"), e) && fs_remove_tree(out.s, e) &&
+              fs_make_dirs(out.s, e) && make(p, k, job, key, out.s, e) &&
+              (why.msg[0] == '\0' || fs_remove_tree(path.s, e)) && /* one that is not whole */
+              put_in_place(p, k, out.s, e);
     if (!ok)
-        (void)!fs_remove_tree(out, &why);
+        (void)!fs_remove_tree(out.s, &why);
     json_decref(job);
     *made = ok;
     return ok;

@@ -133,10 +133,10 @@ static bool add_results(const struct plan *p, int k, const char *out, json_t *re
     /* Margin and filter are one object each, the same in all. */
     static const char *const lists[] = {"claims", "not_expressible", "loader",       "consistency",
                                         "noise",  "engine_margin",   "engine_filter"};
-    char path[PLAN_PATH + 256], to[PLAN_PATH + 16];
+    const struct path path = job_run_artefact(p, k, "results.json"),
+                      data = job_run_artefact(p, k, "data");
     json_t *part;
-    job_run_artefact(p, k, "results.json", path);
-    if (!job_run_verify(p, k, e) || !results_read(path, &part, e))
+    if (!job_run_verify(p, k, e) || !results_read(path.s, &part, e))
         return false;
     for (size_t i = 0; i < sizeof lists / sizeof *lists; i++) {
         json_t *more = json_object_get(part, lists[i]), *all = json_object_get(results, lists[i]);
@@ -152,11 +152,9 @@ static bool add_results(const struct plan *p, int k, const char *out, json_t *re
     double seconds = member_number(results, "seconds") + member_number(part, "seconds");
     json_object_set_new(results, "seconds", json_real(seconds));
     json_decref(part);
-    job_run_artefact(p, k, "data", path);
-    snprintf(to, sizeof to, "%.4000s", out);
-    const char *const copy[] = {"cp", "-a", "--", path, to, NULL};
+    const char *const copy[] = {"cp", "-a", "--", data.s, out, NULL};
     const struct process process = {.argv = copy};
-    return access(path, F_OK) != 0 || process_run(&process, NULL, e);
+    return access(data.s, F_OK) != 0 || process_run(&process, NULL, e);
 }
 
 int job_validate_gather(const struct plan *p, int argc, char **argv, struct err *e)

@@ -4,7 +4,7 @@
 #ifndef ASSAY_PLAN_H
 #define ASSAY_PLAN_H
 
-#include "renderer/base/err.h"
+#include "renderer/base/fs.h"
 
 #include <jansson.h>
 
@@ -55,7 +55,7 @@ int plan_gather(const struct plan *p, struct err *e);
 bool plan_enter(const struct plan *p, struct err *e) __attribute__((warn_unused_result));
 
 /* DIR/jobs/KEY of job k[/name]. */
-void job_run_artefact(const struct plan *p, int k, const char *name, char path[PLAN_PATH + 256]);
+struct path job_run_artefact(const struct plan *p, int k, const char *name);
 /* A text of the head. */
 const char *plan_text(const struct plan *p, const char *name);
 bool plan_are_texts(const json_t *array);

@@ -1,3 +1,4 @@
+#define _GNU_SOURCE
 #include "slurm.h"
 
 #include "reference/base/process.h"
@@ -20,7 +21,6 @@ enum {
     MOST_TRIES = 3,
     LOOKS_BEFORE_LOST =
         2, /* out of the queue and without artefact: files may take a moment to be seen */
-    ROOM = PLAN_PATH + 64
 };
 static const double patience_s = 60; /* with a controller that does not answer */
 
@@ -39,26 +39,25 @@ struct cluster {
     sigset_t signals;
 };
 
-static void round_path(const struct cluster *c, int round, char path[ROOM])
+static struct path round_path(const struct cluster *c, int round)
 {
-    snprintf(path, ROOM, "%s/%s%d", c->plan->dir, c->name, round);
+    return fs_path("%s/%s%d", c->plan->dir, c->name, round);
 }
 
 /* Runs one of Slurm's programs; what it prints is in DIR/log/NAME. */
-static bool ask(const struct cluster *c, const char *const *argv, char log[ROOM], struct err *e)
+static bool ask(const struct cluster *c, const char *const *argv, struct path *log, struct err *e)
 {
-    snprintf(log, ROOM, "%s/log/%s", c->plan->dir, argv[0]);
-    const struct process p = {.argv = argv, .log = log, .timeout_s = patience_s};
+    *log = fs_path("%s/log/%s", c->plan->dir, argv[0]);
+    const struct process p = {.argv = argv, .log = log->s, .timeout_s = patience_s};
     return process_run(&p, NULL, e);
 }
 
 /* Which jobs a round is of, a line for each task. */
 static bool read_round(struct cluster *c, int round)
 {
-    char path[ROOM], *line = NULL;
+    char *line = NULL;
     size_t room = 0;
-    round_path(c, round, path);
-    FILE *f = fopen(path, "r");
+    FILE *f = fopen(round_path(c, round).s, "r");
     if (f == NULL)
         return false;
     for (int task = 1; getline(&line, &room, f) > 0; task++)
@@ -79,19 +78,20 @@ static bool read_round(struct cluster *c, int round)
 /* Marks the jobs of tasks that Slurm still knows. */
 static bool look_at_queue(struct cluster *c, struct err *e)
 {
-    char log[ROOM], user[32], *line = NULL;
+    struct path log;
+    char user[32], *line = NULL;
     size_t room = 0, each = MOST_TASKS + 1, n = strlen(c->name);
     snprintf(user, sizeof user, "%lu", (unsigned long)getuid());
     const char *const argv[] = {"squeue", "-h", "-r", "-u", user, "-o", "%j %K %T", NULL};
-    if (!ask(c, argv, log, e))
+    if (!ask(c, argv, &log, e))
         return false;
     bool *seen = calloc((size_t)c->rounds + 1, each * sizeof *seen);
-    FILE *f = fopen(log, "r");
+    FILE *f = fopen(log.s, "r");
     if (f == NULL || seen == NULL) {
         free(seen);
         if (f != NULL)
             fclose(f);
-        return err_set(e, "%s: %s", log, f == NULL ? strerror(errno) : "out of memory");
+        return err_set(e, "%s: %s", log.s, f == NULL ? strerror(errno) : "out of memory");
     }
     c->running = c->queued = 0;
     while (getline(&line, &room, f) > 0) {
@@ -116,9 +116,7 @@ static bool look_at_queue(struct cluster *c, struct err *e)
 /* Listing a directory makes a network's file system ask anew what is in it. */
 static void look_at_artefacts(struct cluster *c)
 {
-    char path[ROOM];
-    snprintf(path, sizeof path, "%s/jobs", c->plan->dir);
-    DIR *d = opendir(path);
+    DIR *d = opendir(fs_path("%s/jobs", c->plan->dir).s);
     while (d != NULL && readdir(d) != NULL)
         continue;
     if (d != NULL)
@@ -140,10 +138,9 @@ static bool is_lost(const struct job *j)
 /* The last line that a job's task printed. */
 static void last_words(const struct cluster *c, const struct job *j, char text[256])
 {
-    char path[ROOM], *line = NULL;
+    char *line = NULL;
     size_t room = 0;
-    snprintf(path, sizeof path, "%s/log/%s%d-%d.txt", c->plan->dir, c->name, j->round, j->task);
-    FILE *f = fopen(path, "r");
+    FILE *f = fopen(fs_path("%s/log/%s%d-%d.txt", c->plan->dir, c->name, j->round, j->task).s, "r");
     strcpy(text, "it printed nothing");
     while (f != NULL && getline(&line, &room, f) > 0) {
         line[strcspn(line, "\n")] = '\0';
@@ -158,13 +155,11 @@ static void last_words(const struct cluster *c, const struct job *j, char text[2
  * different tasks. */
 static bool write_round(struct cluster *c, int lost, int tasks, struct err *e)
 {
-    char path[ROOM];
     struct out_file out;
     int *job = calloc((size_t)lost, sizeof *job), num = 0;
     if (job == NULL)
         return err_set(e, "out of memory");
-    round_path(c, c->rounds, path);
-    if (!out_open(&out, path, e)) {
+    if (!out_open(&out, round_path(c, c->rounds).s, e)) {
         free(job);
         return false;
     }
@@ -185,47 +180,49 @@ static bool write_round(struct cluster *c, int lost, int tasks, struct err *e)
 /* The next round: an array whose tasks each run the jobs of a line. */
 static bool submit(struct cluster *c, int lost, struct err *e)
 {
-    char todo[ROOM], name[64], array[64], cpus[64], log[ROOM], script[3 * ROOM];
+    char name[64], array[64], cpus[64];
     int tasks = lost < MOST_TASKS ? lost : MOST_TASKS;
     c->rounds++;
     if (!write_round(c, lost, tasks, e))
         return false;
     const struct path assay = fs_beside_program("assay");
-    round_path(c, c->rounds, todo);
+    const struct path todo = round_path(c, c->rounds),
+                      output =
+                          fs_path("--output=%s/log/%s%d-%%a.txt", c->plan->dir, c->name, c->rounds);
     snprintf(name, sizeof name, "--job-name=%s%d", c->name, c->rounds);
     snprintf(array, sizeof array, "--array=1-%d", tasks);
     snprintf(cpus, sizeof cpus, "--cpus-per-task=%d",
              (int)json_integer_value(json_object_get(c->plan->head, "cpus")));
-    char output[ROOM + 64];
-    snprintf(output, sizeof output, "--output=%s/log/%s%d-%%a.txt", c->plan->dir, c->name,
-             c->rounds);
     char *run =
         shell_quote_join("exec", (const char *const[]){assay.s, "run-job", c->plan->dir, NULL});
-    char *jobs = shell_quote_join(NULL, (const char *const[]){todo, NULL});
-    bool ok = run != NULL && jobs != NULL;
-    size_t need = ok ? (size_t)snprintf(script, sizeof script,
-                                        "%s $(sed -n ${SLURM_ARRAY_TASK_ID}p %s)", run, jobs)
-                     : 0;
+    char *jobs = shell_quote_join(NULL, (const char *const[]){todo.s, NULL}), *script = NULL;
+    bool ok = run != NULL && jobs != NULL &&
+              asprintf(&script, "%s $(sed -n ${SLURM_ARRAY_TASK_ID}p %s)", run, jobs) >= 0;
+    if (ok) {
+        struct path log;
+        const char *const argv[] = {"sbatch", "--no-requeue", "--open-mode=append",
+                                    name,     array,          cpus,
+                                    output.s, "--wrap",       script,
+                                    NULL};
+        ok = ask(c, argv, &log, e);
+    } else {
+        err_set(e, "out of memory");
+    }
     free(run);
     free(jobs);
-    if (!ok)
-        return err_set(e, "out of memory");
-    if (need >= sizeof script)
-        return err_set(e, "%.64s...: path too long", c->plan->dir);
-    const char *const argv[] = {
-        "sbatch", "--no-requeue", "--open-mode=append", name, array, cpus, output, "--wrap", script,
-        NULL};
-    return ask(c, argv, log, e);
+    free(script);
+    return ok;
 }
 
 static void cancel(const struct cluster *c)
 {
     struct err ignored;
-    char log[ROOM], name[64];
+    struct path log;
+    char name[64];
     for (int r = 1; r <= c->rounds; r++) {
         snprintf(name, sizeof name, "%s%d", c->name, r);
         const char *const argv[] = {"scancel", "-n", name, NULL};
-        (void)!ask(c, argv, log, &ignored);
+        (void)!ask(c, argv, &log, &ignored);
     }
 }
 
@@ -286,17 +283,12 @@ static bool follow(struct cluster *c, struct err *e)
 
 bool slurm_make(const struct plan *p, struct err *e)
 {
-    char path[ROOM], hex[65];
+    char hex[65];
     struct cluster c = {.plan = p};
     sigset_t old;
-    snprintf(path, sizeof path, "%s/plan.jsonl", p->dir);
-    if (!sha256_file(path, hex, e))
-        return false;
-    snprintf(path, sizeof path, "%s/log", p->dir);
-    if (!fs_make_dirs(path, e))
-        return false;
-    snprintf(path, sizeof path, "%s/jobs", p->dir);
-    if (!fs_make_dirs(path, e))
+    if (!sha256_file(fs_path("%s/plan.jsonl", p->dir).s, hex, e) ||
+        !fs_make_dirs(fs_path("%s/log", p->dir).s, e) ||
+        !fs_make_dirs(fs_path("%s/jobs", p->dir).s, e))
         return false;
     c.job = calloc((size_t)p->num + 1, sizeof *c.job);
     if (c.job == NULL)
