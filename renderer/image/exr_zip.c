@@ -85,17 +85,20 @@ const void *exr_zip_rows(struct exr_zip *z, const float *rows, int num, size_t *
 const float *exr_zip_unpack(struct exr_zip *z, const void *bytes, size_t size, int num)
 {
     const size_t length = (size_t)num * z->width * z->channels * sizeof(float);
-    uint8_t *even = z->mixed, *odd = z->mixed + length / 2, last = 128;
+    const uint8_t *even = z->mixed, *odd = z->mixed + length / 2;
+    uint8_t *raw = z->raw, last[2] = {128, 128};
     if (size == length)
         return memcpy(z->raw, bytes, size);
     if (libdeflate_zlib_decompress(z->decompressor, bytes, size, z->mixed, length, NULL) !=
         LIBDEFLATE_SUCCESS)
         return NULL;
-    for (size_t i = 0; i < length; i++)
-        z->mixed[i] = last = (uint8_t)(last + z->mixed[i] - 128);
+    /* Differences reach from the last byte at an even place to the first at an odd one. Their number is even, and the
+     * 128 that each is too large add up to nothing. */
+    for (size_t i = 0; i < length / 2; i++)
+        last[1] = (uint8_t)(last[1] + even[i]);
     for (size_t i = 0; i < length / 2; i++) {
-        z->raw[2 * i] = even[i];
-        z->raw[2 * i + 1] = odd[i];
+        raw[2 * i] = last[0] = (uint8_t)(last[0] + even[i] - 128);
+        raw[2 * i + 1] = last[1] = (uint8_t)(last[1] + odd[i] - 128);
     }
     return (const float *)(const void *)z->raw;
 }
