@@ -21,4 +21,14 @@ bool isa_choose(enum isa *isa, struct err *e) __attribute__((warn_unused_result)
 
 extern const char *const isa_names[]; /* by enum isa; ends with NULL */
 
+/* Before a function with loops over many numbers: it is compiled for wider vectors, too, and the machine's choice is made
+ * when the program is loaded, which is before sanitizers are ready. The same bits, as the compiler neither contracts nor
+ * reorders. */
+#if defined __GLIBC__ && !defined __clang__ && !defined __SANITIZE_ADDRESS__ &&                    \
+    !defined __SANITIZE_THREAD__
+#define ISA_CLONES __attribute__((target_clones("avx512f", "avx2", "default")))
+#else
+#define ISA_CLONES
+#endif
+
 #endif

@@ -72,9 +72,10 @@ static void scan(const struct judge *j, const struct pyramid *p, int l, int y, i
                  struct sweep *s)
 {
     const struct pyramid_level *level = &p->level[l];
-    size_t regions = (size_t)level->nx * (size_t)level->ny;
+    const size_t regions = (size_t)level->nx * (size_t)level->ny;
+    const int statistic = regions > 1 ? STATISTIC_PYRAMID : STATISTIC_IMAGE;
     for (size_t i = 0; i < regions; i++) {
-        if (region_is_hopeless(j, &level->cell[i]))
+        if (region_is_hopeless(j, &level->cell[i], statistic))
             continue;
         struct measured m = measure_in(j, p, l, i);
         if (!region_testable(j, &m))

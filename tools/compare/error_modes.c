@@ -1,6 +1,7 @@
 #include "error_modes.h"
 
 #include "pyramid.h"
+#include "renderer/base/isa.h"
 
 #include <assert.h>
 #include <math.h>
@@ -41,35 +42,40 @@ size_t error_modes_at(const struct error_modes_frame *f, int x, int y)
     return (size_t)(y - f->y) * (size_t)f->across + (size_t)(x - f->x);
 }
 
-/* The part of the image that reaches so much further. */
-static struct rect grown(const struct error_modes *modes, struct rect r, int by)
+/* So much further on every side, beyond the image, too. */
+static struct rect grown(struct rect r, int by)
 {
-    int x = r.x > by ? r.x - by : 0, y = r.y > by ? r.y - by : 0;
-    int right = r.x + r.width + by, below = r.y + r.height + by;
-    return (struct rect){x, y, (right < modes->width ? right : modes->width) - x,
-                         (below < modes->height ? below : modes->height) - y};
+    return (struct rect){r.x - by, r.y - by, r.width + 2 * by, r.height + 2 * by};
 }
 
-static void fill_side(const struct error_modes *modes, struct error_modes_frame *f, int side)
+/* Beyond the image all is 0. */
+ISA_CLONES static void fill_side(const struct error_modes *modes, struct error_modes_frame *f,
+                                 int side)
 {
     const struct moments *m = modes->side[side];
     const bool exact = strcmp(m->unit, "exact") == 0;
-    const size_t across = (size_t)f->across, room = f->room;
+    const int x = f->x > 0 ? f->x : 0, right = f->x + f->across,
+              num = (right < modes->width ? right : modes->width) - x;
+    const size_t room = f->room, row = (size_t)f->across * sizeof *f->data;
     for (int y = f->y; y < f->y + f->down; y++) {
-        const size_t to = error_modes_at(f, f->x, y),
-                     from = (size_t)y * (size_t)modes->width + (size_t)f->x;
-        double *sd = f->sd[side] + to, *mean = f->mean[side] + to;
-        for (size_t x = 0; x < across; x++) {
-            double n = moments_n(m, from + x), v = exact ? 0 : 1 / (n * (n - 1));
-            f->n[side][to + x] = n;
+        const size_t to = error_modes_at(f, x, y),
+                     from = (size_t)y * (size_t)modes->width + (size_t)x;
+        double *sd = f->sd[side] + to, *mean = f->mean[side] + to, *count = f->n[side] + to;
+        for (size_t c = 0; c < 3; c++) {
+            memset(sd + c * room - (x - f->x), 0, row);
+            memset(mean + c * room - (x - f->x), 0, row);
+        }
+        for (size_t i = 0; y >= 0 && y < modes->height && i < (size_t)num; i++) {
+            double n = moments_n(m, from + i), v = exact ? 0 : 1 / (n * (n - 1));
+            count[i] = n;
             for (size_t c = 0; c < 3; c++) {
-                mean[c * room + x] = moments_mean(m, 3 * (from + x) + c);
-                sd[c * room + x] = moments_m2(m, 3 * (from + x) + c) * v;
+                mean[c * room + i] = moments_mean(m, 3 * (from + i) + c);
+                sd[c * room + i] = moments_m2(m, 3 * (from + i) + c) * v;
             }
         }
         for (size_t c = 0; c < 3; c++)
-            for (size_t x = 0; x < across; x++)
-                sd[c * room + x] = sqrt(sd[c * room + x]);
+            for (size_t i = 0; i < (size_t)num; i++)
+                sd[c * room + i] = sqrt(sd[c * room + i]);
     }
 }
 
@@ -89,51 +95,51 @@ static void fill_root(const struct error_modes *modes, struct error_modes_frame 
         }
 }
 
+/* How many of the `size` places are at most `reach` away from place i. */
+static inline int places(int i, int reach, int size)
+{
+    const int first = i < reach ? 0 : i - reach, last = i + reach < size ? i + reach : size - 1;
+    return last - first + 1;
+}
+
 /* One plane: out = mean of f(in) over the (2 reach + 1)^2 pixels around each of r that lie in the image, without the
  * pixel itself; f is the square or nothing. */
-static void around(const struct error_modes *modes, const struct error_modes_frame *f,
-                   struct rect r, const double *in, bool square, int reach, double *out)
+static inline __attribute__((always_inline)) void around(const struct error_modes *modes,
+                                                         const struct error_modes_frame *f,
+                                                         struct rect r, const double *in,
+                                                         bool square, int reach, double *out)
 {
-    const struct rect from = grown(modes, r, reach);
-    for (int y = from.y; y < from.y + from.height; y++)
-        for (int k = -reach; k <= reach; k++) {
-            const int first = r.x + k > 0 ? r.x : -k;
-            const int end = r.x + r.width + k < modes->width ? r.x + r.width : modes->width - k;
-            double *row = f->row + error_modes_at(f, first, y);
-            const double *v = in + error_modes_at(f, first, y) + k;
-            if (k == -reach)
-                memset(f->row + error_modes_at(f, r.x, y), 0, (size_t)r.width * sizeof *row);
-            for (int x = 0; x < end - first; x++)
-                row[x] += square ? v[x] * v[x] : v[x];
+    for (int y = r.y - reach; y < r.y + r.height + reach; y++) {
+        const size_t at = error_modes_at(f, r.x, y);
+        for (int x = 0; x < r.width; x++) {
+            double sum = 0;
+            for (int k = -reach; k <= reach; k++) {
+                const double v = in[(ptrdiff_t)at + x + k];
+                sum += square ? v * v : v;
+            }
+            f->row[at + (size_t)x] = sum;
         }
+    }
     for (int y = r.y; y < r.y + r.height; y++) {
         const size_t at = error_modes_at(f, r.x, y);
-        const int lo = y < reach ? 0 : y - reach;
-        const int hi = y + reach < modes->height ? y + reach : modes->height - 1;
-        for (int x = 0; x < r.width; x++)
-            out[at + (size_t)x] =
-                square ? -(in[at + (size_t)x] * in[at + (size_t)x]) : -in[at + (size_t)x];
-        for (int k = lo; k <= hi; k++) {
-            const double *row = f->row + error_modes_at(f, r.x, k);
-            for (int x = 0; x < r.width; x++)
-                out[at + (size_t)x] += row[x];
-        }
-        for (int x = r.x; x < r.x + r.width; x++) {
-            int x_lo = x < reach ? 0 : x - reach;
-            int x_hi = x + reach < modes->width ? x + reach : modes->width - 1;
-            double others = (double)(hi - lo + 1) * (x_hi - x_lo + 1) - 1;
-            double *o = &out[at + (size_t)(x - r.x)];
-            *o = larger(0, *o) / others;
+        const int rows = places(y, reach, modes->height);
+        for (int x = 0; x < r.width; x++) {
+            const double v = in[at + (size_t)x];
+            double sum = square ? -(v * v) : -v;
+            for (int k = -reach; k <= reach; k++)
+                sum += f->row[(ptrdiff_t)at + x + (ptrdiff_t)k * f->across];
+            const int others = rows * places(r.x + x, reach, modes->width) - 1;
+            out[at + (size_t)x] = larger(0, sum) / (others > 1 ? others : 1);
         }
     }
 }
 
 /* Moves the frame to the pixels r of the image and computes what is asked of them. */
 enum depth { VARIANCES, WEIGHTS, ALL };
-static void move_frame(const struct error_modes *modes, struct error_modes_frame *f, struct rect r,
-                       enum depth depth)
+ISA_CLONES static void move_frame(const struct error_modes *modes, struct error_modes_frame *f,
+                                  struct rect r, enum depth depth)
 {
-    const struct rect near = grown(modes, r, depth == ALL ? 1 : 0), whole = grown(modes, near, 2);
+    const struct rect near = grown(r, depth == ALL ? 1 : 0), whole = grown(near, 2);
     f->x = whole.x;
     f->y = whole.y;
     f->across = whole.width;
@@ -190,13 +196,11 @@ static void find_least(struct error_modes *modes)
         const int left = modes->height - y,
                   rows = left < ERROR_MODES_BAND ? left : ERROR_MODES_BAND;
         move_frame(modes, &modes->own, (struct rect){0, y, modes->width, rows}, VARIANCES);
-        const size_t at = error_modes_at(&modes->own, 0, y),
-                     end = at + (size_t)rows * (size_t)modes->width;
-        for (size_t i = at; i < end; i++)
-            for (size_t c = 0; c < 3; c++)
-                mean[c] +=
-                    3 * (modes->own.around[0][c * room + i] + modes->own.around[1][c * room + i]) /
-                    n;
+        for (int i = 0; i < rows * modes->width; i++)
+            for (size_t c = 0,
+                        at = error_modes_at(&modes->own, i % modes->width, y + i / modes->width);
+                 c < 3; c++, at += room)
+                mean[c] += 3 * (modes->own.around[0][at] + modes->own.around[1][at]) / n;
     }
     for (int c = 0; c < 3; c++)
         modes->least[c] = smallest_variance * mean[c];
@@ -208,7 +212,7 @@ bool error_modes_open(const struct moments *a, const struct moments *b, struct e
     const int halo = 3, rows = a->height < ERROR_MODES_BAND ? a->height : ERROR_MODES_BAND;
     assert(a->width > 1 || a->height > 1);
     *out = (struct error_modes){{a, b}, .width = a->width, .height = a->height};
-    const size_t room = (size_t)a->width * (size_t)(rows + 2 * halo);
+    const size_t room = (size_t)(a->width + 2 * halo) * (size_t)(rows + 2 * halo);
     if (!alloc_frame(&out->own, room) || !alloc_frame(&out->turned, room) ||
         (a->width == a->height && !alloc_frame(&out->columns, room))) {
         error_modes_free(out);
@@ -254,7 +258,8 @@ static double over(double x)
 }
 
 /* Minus the central difference, from the rows (or, down, columns) beside that of the pixel. */
-static void shift(const struct error_modes *modes, bool down, int y, double *const out[3])
+ISA_CLONES static void shift(const struct error_modes *modes, bool down, int y,
+                             double *const out[3])
 {
     const struct error_modes_frame *f = &modes->own;
     const int last = modes->width - 1;
@@ -273,8 +278,8 @@ static void shift(const struct error_modes *modes, bool down, int y, double *con
 }
 
 /* B of channel from[c] around the pixel less B around it. */
-static void swap(const struct error_modes *modes, const int from[3], int y,
-                 const struct error_change *out)
+ISA_CLONES static void swap(const struct error_modes *modes, const int from[3], int y,
+                            const struct error_change *out)
 {
     const struct error_modes_frame *f = &modes->own;
     const size_t at = error_modes_at(f, 0, y), room = f->room;
@@ -290,8 +295,8 @@ static void swap(const struct error_modes *modes, const int from[3], int y,
 }
 
 /* B of another pixel less B around its own. That of column 0 is number `other` of frame g, the next `step` further on. */
-static void move(const struct error_modes *modes, const struct error_modes_frame *g, size_t other,
-                 ptrdiff_t step, int y, const struct error_change *out)
+ISA_CLONES static void move(const struct error_modes *modes, const struct error_modes_frame *g,
+                            size_t other, ptrdiff_t step, int y, const struct error_change *out)
 {
     const struct error_modes_frame *f = &modes->own;
     const double *b = g->mean[1] + other, *sd = g->sd[1] + other, *weight = g->weight + other;

@@ -151,6 +151,7 @@ static bool changed(const struct images *m, const struct change *how, size_t k, 
 static void add_block(const struct images *m, const struct change *how, size_t k, int column,
                       int row, size_t *first, struct excess *out)
 {
+    struct excess e = *out; /* in registers */
     const double *weight = m->weight + 3 * ((size_t)row * (size_t)m->columns + (size_t)column);
     double before[3] = {0}, after[3] = {0}, v_before[3] = {0}, v_after[3] = {0};
     int num = 0;
@@ -158,7 +159,7 @@ static void add_block(const struct images *m, const struct change *how, size_t k
         for (int x = column * BLOCK; x < (column + 1) * BLOCK && x < m->side[0]->width; x++) {
             const struct value *a = how->sample->side[0][*first], *b = how->sample->side[1][*first];
             struct value new[3];
-            out->of++;
+            e.of++;
             ++*first;
             if (!changed(m, how, k, x, y, b, new))
                 continue;
@@ -166,22 +167,23 @@ static void add_block(const struct images *m, const struct change *how, size_t k
             for (size_t c = 0; c < 3; c++) {
                 double d = a[c].mean - b[c].mean, va = a[c].var, r = a[c].mean - new[c].mean,
                        vb = b[c].var;
-                out->before[0] += weight[c] * (d * d - va - vb);
-                out->after[0] += weight[c] * (r * r - va - new[c].var);
+                e.before[0] += weight[c] * (d * d - va - vb);
+                e.after[0] += weight[c] * (r * r - va - new[c].var);
                 before[c] += d;
                 after[c] += r;
                 v_before[c] += va + vb;
                 v_after[c] += va + new[c].var;
             }
         }
-    out->num[0] += (size_t)num;
-    out->num[1] += num > 0;
+    e.num[0] += (size_t)num;
+    e.num[1] += num > 0;
     for (size_t c = 0; num > 0 && c < 3; c++) {
-        out->all_before += before[c] * before[c] / num;
-        out->all_after += after[c] * after[c] / num;
-        out->before[1] += weight[c] / num * (before[c] * before[c] - v_before[c]);
-        out->after[1] += weight[c] / num * (after[c] * after[c] - v_after[c]);
+        e.all_before += before[c] * before[c] / num;
+        e.all_after += after[c] * after[c] / num;
+        e.before[1] += weight[c] / num * (before[c] * before[c] - v_before[c]);
+        e.after[1] += weight[c] / num * (after[c] * after[c] - v_after[c]);
     }
+    *out = e;
 }
 
 static struct excess measure(const struct images *m, enum error_mode_kind kind, double amount,
@@ -327,22 +329,26 @@ static bool open_images(const struct moments *a, const struct moments *b, struct
                          .rows = (b->height + BLOCK - 1) / BLOCK};
     size_t blocks = (size_t)m->columns * (size_t)m->rows,
            values = 3 * (size_t)b->width * (size_t)b->height;
-    double mean_var = 0, mean_square = 0;
+    double mean_var = 0, mean_square = 0, mean_b = 0;
     m->weight = calloc(4 * blocks, sizeof *m->weight);
     if (m->weight == NULL || !open_sample(m, ENOUGH_TO_FIT, &m->few) ||
         !open_sample(m, ENOUGH, &m->many))
         return false;
     double *num = m->weight + 3 * blocks;
-    for (size_t i = 0; i < values; i++) {
-        size_t p = i / 3, x = p % (size_t)b->width, y = p / (size_t)b->width,
-               k = y / BLOCK * (size_t)m->columns + x / BLOCK;
-        double v = variance(m, 0, i) + variance(m, 1, i);
-        m->weight[3 * k + i % 3] += v;
+    for (size_t i = 0, x = 0, y = 0; i < values; i++, x++) {
+        if (x == 3 * (size_t)b->width) {
+            x = 0;
+            y++;
+        }
+        const size_t k = y / BLOCK * (size_t)m->columns + x / (3 * BLOCK);
+        const double v = variance(m, 0, i) + variance(m, 1, i), mean = moments_mean(b, i);
+        m->weight[3 * k + x % 3] += v;
         num[k] += 1. / 3;
         mean_var += v / (double)values;
-        mean_square += moments_mean(b, i) * moments_mean(b, i) / (double)values;
-        m->mean += moments_mean(b, i) / (double)values;
+        mean_square += mean * mean / (double)values;
+        mean_b += mean / (double)values;
     }
+    m->mean = mean_b;
     for (size_t k = 0; k < 3 * blocks; k++)
         m->weight[k] =
             1 / (fmax(m->weight[k] / num[k / 3], least * mean_var) + dust * mean_square + 1e-300);

@@ -1,5 +1,7 @@
 #include "matched_filter.h"
 
+#include "renderer/base/isa.h"
+
 #include <math.h>
 #include <stdlib.h>
 
@@ -26,8 +28,8 @@ static double larger(double a, double b)
 /* A or B in pixels number `at` and on, their channels weighted. Their correlation is unknown: see pyramid_pixel_estimate(). Where
  * weights have both signs the third cumulants of the channels are added all the same: that they cancel if
  * the channels are perfectly correlated is no permission. */
-static void weigh(const struct error_modes_frame *f, int side, size_t at, size_t num,
-                  struct chunk *t)
+ISA_CLONES static void weigh(const struct error_modes_frame *f, int side, size_t at, size_t num,
+                             struct chunk *t)
 {
     const double *n = f->n[side] + at, *mean = f->mean[side] + at, *sd = f->sd[side] + at,
                  *root = f->root[side] + at;
@@ -56,8 +58,9 @@ static void weigh(const struct error_modes_frame *f, int side, size_t at, size_t
 }
 
 /* Pixels x .. x+num-1 of row y. */
-static void add_chunk(const struct judge *j, const struct error_modes *modes, int x, int y,
-                      size_t num, const struct error_change *change, struct sums *sums)
+ISA_CLONES static void add_chunk(const struct judge *j, const struct error_modes *modes, int x,
+                                 int y, size_t num, const struct error_change *change,
+                                 struct sums *sums)
 {
     const struct error_modes_frame *f = &modes->own;
     const size_t at = error_modes_at(f, x, y);

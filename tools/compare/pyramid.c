@@ -1,6 +1,7 @@
 #include "pyramid.h"
 
 #include "renderer/base/huge_alloc.h"
+#include "renderer/base/isa.h"
 
 #include <assert.h>
 #include <math.h>
@@ -11,32 +12,54 @@ enum { SMALLEST_BAND = 32 }; /* rows */
 const double float_tolerance = 1e-5;
 const double luminance_weight[3] = {0.2126, 0.7152, 0.0722};
 
-static inline struct estimate estimate(const struct moments *m, bool exact, size_t pixel,
-                                       int channel)
+/* Estimates in neighbouring pixels of one side: arrays that stay in the first cache, for vectors. */
+enum { RUN = 64 };
+struct run {
+    double n[RUN], v_scale[RUN], k_scale[RUN], mean[RUN], v[RUN], k3[RUN];
+    double var_v[RUN], var_v_normal[RUN], var_k3[RUN], tolerance[RUN];
+};
+
+ISA_CLONES static void estimate(const struct moments *m, bool exact, int channel, size_t first,
+                                size_t num, struct run *r)
 {
-    double n = moments_n(m, pixel);
-    assert(exact || n >= 3);
-    double v_scale = exact ? 0 : 1 / (n * (n - 1));
-    double k_scale = exact ? 0 : v_scale / (n - 2);
-    const double *tolerance = m->tolerance != NULL ? m->tolerance + 3 * pixel : (double[3]){0};
-    if (channel < CHANNEL_LUMINANCE) {
-        size_t i = 3 * pixel + (size_t)channel;
-        struct estimate est = pyramid_estimate_from(moments_mean(m, i), moments_m2(m, i) * v_scale,
-                                                    moments_m3(m, i) * k_scale, n);
-        est.tolerance = tolerance[channel];
-        return est;
+    const bool luminance = channel == CHANNEL_LUMINANCE;
+    for (size_t p = 0; p < num; p++) {
+        const double n = moments_n(m, first + p);
+        r->n[p] = n;
+        r->v_scale[p] = exact ? 0 : 1 / (n * (n - 1));
+        r->k_scale[p] = exact ? 0 : r->v_scale[p] / (n - 2);
+        r->mean[p] = r->v[p] = r->k3[p] = r->tolerance[p] = 0;
     }
-    double sum = 0, deviation = 0, root = 0, rounding = 0;
-    for (size_t c = 0; c < 3; c++) {
-        size_t i = 3 * pixel + c;
-        sum += luminance_weight[c] * moments_mean(m, i);
-        deviation += luminance_weight[c] * sqrt(moments_m2(m, i) * v_scale);
-        root += luminance_weight[c] * cbrt(moments_m3(m, i) * k_scale);
-        rounding += luminance_weight[c] * tolerance[c];
+    for (size_t c = luminance ? 0 : (size_t)channel; c <= (luminance ? 2 : (size_t)channel); c++) {
+        const double w = luminance ? luminance_weight[c] : 1;
+        for (size_t p = 0, i = 3 * first + c; p < num; p++, i += 3) {
+            const double v = moments_m2(m, i) * r->v_scale[p];
+            r->mean[p] += w * moments_mean(m, i);
+            r->v[p] += w * (luminance ? sqrt(v) : v);
+        }
+        for (size_t p = 0, i = 3 * first + c; p < num; p++, i += 3) {
+            const double k3 = moments_m3(m, i) * r->k_scale[p];
+            r->k3[p] += w * (luminance ? cbrt(k3) : k3);
+        }
+        for (size_t p = 0, i = 3 * first + c; m->tolerance != NULL && p < num; p++, i += 3)
+            r->tolerance[p] += w * m->tolerance[i];
     }
-    struct estimate est = pyramid_estimate_from(sum, deviation * deviation, root * root * root, n);
-    est.tolerance = rounding;
-    return est;
+    for (size_t p = 0; p < num; p++) {
+        const double v = r->v[p], k3 = r->k3[p];
+        const struct estimate est = pyramid_estimate_from(r->mean[p], luminance ? v * v : v,
+                                                          luminance ? k3 * k3 * k3 : k3, r->n[p]);
+        r->v[p] = est.v;
+        r->k3[p] = est.k3;
+        r->var_v[p] = est.var_v;
+        r->var_v_normal[p] = est.var_v_normal;
+        r->var_k3[p] = est.var_k3;
+    }
+}
+
+static struct estimate of_pixel(const struct run *r, size_t p)
+{
+    return (struct estimate){r->mean[p],         r->v[p],      r->k3[p],       r->var_v[p],
+                             r->var_v_normal[p], r->var_k3[p], r->tolerance[p]};
 }
 
 static bool is_exact(const struct moments *m)
@@ -46,7 +69,11 @@ static bool is_exact(const struct moments *m)
 
 struct estimate pyramid_pixel_estimate(const struct moments *m, size_t pixel, int channel)
 {
-    return estimate(m, is_exact(m), pixel, channel);
+    struct run r;
+    const bool exact = is_exact(m);
+    assert(exact || moments_n(m, pixel) >= 3);
+    estimate(m, exact, channel, pixel, 1, &r);
+    return of_pixel(&r, 0);
 }
 
 void pyramid_add_pixel(struct cell *dst, const struct estimate *a, const struct estimate *b)
@@ -109,9 +136,14 @@ static void fill_pixels(const struct moments *a, const struct moments *b, int ch
     const size_t pixels = (size_t)level->nx * (size_t)level->ny;
     const bool exact_a = is_exact(a), exact_b = is_exact(b);
     const bool observed = is_observed(a) && is_observed(b);
+    struct run run[2];
     for (size_t p = 0; p < pixels; p++) {
-        struct estimate ea = estimate(a, exact_a, p, channel),
-                        eb = estimate(b, exact_b, p, channel);
+        if (p % RUN == 0) {
+            const size_t num = pixels - p < RUN ? pixels - p : RUN;
+            estimate(a, exact_a, channel, p, num, &run[0]);
+            estimate(b, exact_b, channel, p, num, &run[1]);
+        }
+        struct estimate ea = of_pixel(&run[0], p % RUN), eb = of_pixel(&run[1], p % RUN);
         level->cell[p] = (struct cell){0};
         pyramid_add_pixel(&level->cell[p], &ea, &eb);
         if (observed && one_value(a, p, channel) && one_value(b, p, channel))

@@ -46,8 +46,8 @@ static double skew_of(const struct cell *cell, double v)
     return (fabs(cell->k3) + sqrt(cell->var_k3)) / (v * sqrt(v));
 }
 
-static struct measured measure(const struct cell *cell, double unit, double size, double margin,
-                               int statistic)
+static struct measured measure(const struct judge *j, const struct cell *cell, double unit,
+                               double size, double margin, int statistic)
 {
     struct measured m = {.d = cell->a - cell->b,
                          .unit = unit,
@@ -63,6 +63,7 @@ static struct measured measure(const struct cell *cell, double unit, double size
         m.dof = stats_dof(m.v, cell->var_v);
         m.dof_normal = stats_dof(m.v, cell->var_v_normal);
         m.skew = skew_of(cell, m.v);
+        m.t_guard = stats_t_of_z(j->z_guard[statistic], m.dof);
     }
     return m;
 }
@@ -70,7 +71,7 @@ static struct measured measure(const struct cell *cell, double unit, double size
 struct measured region_measure(const struct judge *j, const struct cell *cell, struct rect r)
 {
     struct measured m =
-        measure(cell, fmax(cell->b, j->floor * r.width * r.height), fmax(cell->a, cell->b),
+        measure(j, cell, fmax(cell->b, j->floor * r.width * r.height), fmax(cell->a, cell->b),
                 margin_of(j, r), is_image(j, r) ? STATISTIC_IMAGE : STATISTIC_PYRAMID);
     if (is_image(j, r) || j->is_pooled)
         m.skew_around = m.skew;
@@ -80,17 +81,10 @@ struct measured region_measure(const struct judge *j, const struct cell *cell, s
     return m;
 }
 
-void region_look_around(const struct judge *j, struct measured *m, const struct cell *around)
-{
-    double v = around->va + around->vb;
-    if (!m->noise_free && !j->is_pooled)
-        m->skew_around = skew_of(around, v) * sqrt(v / m->v);
-}
-
 struct measured region_measure_weighted(const struct judge *j, const struct cell *cell, double unit,
                                         double size)
 {
-    return measure(cell, unit, size, j->opt.margin_tile, STATISTIC_MATCHED_FILTER);
+    return measure(j, cell, unit, size, j->opt.margin_tile, STATISTIC_MATCHED_FILTER);
 }
 
 /* ln of the factor by which a tail probability at x may be off [Shao99]. */
@@ -104,34 +98,35 @@ static double larger(double a, double b)
     return a > b ? a : b;
 }
 
-/* At the smaller of the critical values of an image and of its regions, as far as t is beyond z. */
-static bool is_beyond(const struct judge *j, const struct cell *cell, double limit)
+/* At the normal critical value x, as t is further out. Most are so far beyond that squares tell it, without a root. */
+static bool is_beyond(const struct cell *cell, double x, double limit)
 {
-    const double v = cell->va + cell->vb, a = j->z_guard[STATISTIC_IMAGE],
-                 b = j->z_guard[STATISTIC_PYRAMID],
+    const double v = cell->va + cell->vb, of_one = skew_factor(1, x),
                  least = float_tolerance * larger(cell->a, cell->b);
-    return v > least * least && skew_factor(skew_of(cell, v), a < b ? a : b) > limit;
+    if (!(v > least * least))
+        return false;
+    return (v > 1e-90 && (cell->k3 * cell->k3 + cell->var_k3) * of_one * of_one >
+                             1.001 * limit * limit * v * v * v) ||
+           skew_factor(skew_of(cell, v), x) > limit;
 }
 
 bool region_is_skewed(const struct judge *j, const struct cell *cell)
 {
-    return is_beyond(j, cell, skew_limit);
+    const double a = j->z_guard[STATISTIC_IMAGE], b = j->z_guard[STATISTIC_PYRAMID];
+    return is_beyond(cell, a < b ? a : b, skew_limit);
 }
 
-bool region_is_hopeless(const struct judge *j, const struct cell *cell)
+bool region_is_hopeless(const struct judge *j, const struct cell *cell, int statistic)
 {
-    return is_beyond(j, cell, skew_limit_raised);
+    return is_beyond(cell, j->z_guard[statistic], skew_limit_raised);
 }
 
-/* t is beyond z: most small regions fail already there. */
+/* t is beyond z but for rounding. */
 static bool is_within(const struct judge *j, const struct measured *m, double skew, double limit,
                       double gx)
 {
-    double z = j->z_guard[m->statistic];
-    if (skew_factor(skew, z) > limit)
-        return false;
-    double t = stats_t_of_z(z, m->dof);
-    return skew_factor(skew, t) <= limit && skew * t <= gx;
+    return skew_factor(skew, j->z_guard[m->statistic]) <= limit &&
+           skew_factor(skew, m->t_guard) <= limit && skew * m->t_guard <= gx;
 }
 
 static bool is_unskewed(const struct judge *j, const struct measured *m)
@@ -142,6 +137,13 @@ static bool is_unskewed(const struct judge *j, const struct measured *m)
 bool region_is_normal(const struct judge *j, const struct measured *m)
 {
     return !m->silent && is_unskewed(j, m);
+}
+
+void region_look_around(const struct judge *j, struct measured *m, const struct cell *around)
+{
+    double v = around->va + around->vb;
+    if (!m->noise_free && !j->is_pooled && is_within(j, m, m->skew, skew_limit_raised, largest_gx))
+        m->skew_around = skew_of(around, v) * sqrt(v / m->v);
 }
 
 bool region_testable(const struct judge *j, const struct measured *m)

@@ -33,6 +33,7 @@ struct measured {
     double dof_normal; /* if the law is normal; for heavier tails it says more of the mean of t^2 */
     double skew;       /* of d: |g| plus one standard error */
     double skew_around; /* the same as what lies around has it; INFINITY: not asked */
+    double t_guard;     /* critical value at which skewness is judged */
     double log10_alike; /* of the cell */
     /* One side, which is no closed form, shows no noise where the other does: its few samples may all have
      * been alike, as where roulette ends one path in twenty, and lie off for that. */
@@ -46,7 +47,8 @@ struct measured region_measure(const struct judge *j, const struct cell *cell, s
 /* Whether region_is_normal(), or region_testable(), will be false because of the skewness alone: most small regions fail
  * there. False says nothing. */
 bool region_is_skewed(const struct judge *j, const struct cell *cell);
-bool region_is_hopeless(const struct judge *j, const struct cell *cell);
+/* The latter for a test by this statistic. */
+bool region_is_hopeless(const struct judge *j, const struct cell *cell, int statistic);
 /* The same as from region_measure() of one pixel: region_t() and the relative difference. */
 double region_pixel_t(const struct judge *j, const struct cell *cell, double *relative);
 
@@ -55,8 +57,8 @@ double region_pixel_t(const struct judge *j, const struct cell *cell, double *re
 struct measured region_measure_weighted(const struct judge *j, const struct cell *cell, double unit,
                                         double size);
 
-/* What the skewness would be if third cumulants were to variances as in a larger region around this one: a small one whose
- * few samples look harmless may be so by luck, and lie off for that. The image needs none. */
+/* What the skewness, unless it forbids a test by itself, would be if third cumulants were to variances as in a larger region
+ * around this one: a small one whose few samples look harmless may be so by luck, and lie off for that. The image needs none. */
 void region_look_around(const struct judge *j, struct measured *m, const struct cell *around);
 
 /* Not silent, and the skew guard: |g| x^3 / 3 <= 0.2 at the critical x; region_testable() lets pass silent ones, and 4 and
