@@ -2,17 +2,11 @@
 
 #include "renderer/base/fs.h"
 #include "report_similarity.h"
-#include "report_noise.h"
-#include "report_stated_error.h"
-#include "report_cost.h"
-#include "report_convergence.h"
 #include "tools/html/html.h"
 #include "tools/html/page_assets.h"
 #include "report_internal.h"
-#include "report_matrix.h"
 #include "tools/plots/plot_rays.h"
 #include "tools/results/plain_words.h"
-#include "report_table.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -148,7 +142,7 @@ static void write_header(FILE *f, const json_t *root, const struct claim_ref *cl
         write_verdict(f, root, claim, num);
     report_stated_error_headline(f, json_object_get(root, "consistency"));
     report_noise_headline(f, json_object_get(root, "noise"));
-    report_convergence_headline(f, json_object_get(root, "convergence"), num == 0);
+    report_convergence_headline(f, root, num == 0);
     fprintf(f,
             "<p class=\"lede\">The chance that noise alone makes any claim of this page "
             "DIFFERENT is at most %.3g (family-wise alpha), and so is the chance of any wrong "
@@ -282,8 +276,7 @@ bool report_write_with(const char *results_path, const char *converge_path, cons
     struct out_file out = {0};
     json_t *root = NULL;
     struct claim_ref *claim = NULL;
-    const char *slash = strrchr(results_path, '/');
-    size_t dir = slash != NULL ? (size_t)(slash - results_path) + 1 : 0;
+    size_t dir = (size_t)(fs_base(results_path) - results_path);
     if (dir >= sizeof page.dir)
         return err_set(e, "%.64s...: path too long", results_path);
     memcpy(page.dir, results_path, dir);

@@ -2,7 +2,6 @@
 
 #include "report_similarity.h"
 #include "tools/html/csv_link.h"
-#include "report_evidence.h"
 #include "tools/html/html.h"
 #include "tools/plots/plot_interval.h"
 #include "tools/plots/plot_power.h"
@@ -11,14 +10,20 @@
 #include <stdlib.h>
 #include <string.h>
 
-void report_claim_error(struct page *p, const struct claim_ref *claim)
+/* "A against B", and the verdict. */
+static void write_heading(FILE *f, const struct claim_ref *claim)
 {
-    FILE *f = p->f;
-    html_print(f, "<article class=\"claim\" id=\"claim-%zu\">\n<h3>%s against ", claim->index,
-               member_text(claim->json, "a"));
+    html_print(f, "<h3>%s against ", member_text(claim->json, "a"));
     report_reference(f, claim);
     fputs(" ", f);
     report_badge(f, claim);
+}
+
+void report_claim_error(struct page *p, const struct claim_ref *claim)
+{
+    FILE *f = p->f;
+    fprintf(f, "<article class=\"claim\" id=\"claim-%zu\">\n", claim->index);
+    write_heading(f, claim);
     html_print(f, "</h3>\n<p class=\"error-line\">This claim could not be judged: %s",
                member_text(claim->json, "error"));
     fputs(results_claim_lacks_time(claim->json)
@@ -109,11 +114,9 @@ bool report_claim(struct page *p, const struct claim_ref *claim, const struct cl
     report_reference(f, claim);
     const bool expected = claim->outcome == OUTCOME_AS_EXPECTED,
                is_comparison = strcmp(member_text(json, "scene"), "files") == 0;
-    fprintf(f, "\">\n<details class=\"evidence\"%s>\n", expected && p->folded ? "" : " open");
-    html_print(f, "<summary><h3>%s against ", member_text(json, "a"));
-    report_reference(f, claim);
-    fputs(" ", f);
-    report_badge(f, claim);
+    fprintf(f, "\">\n<details class=\"evidence\"%s>\n<summary>",
+            expected && p->folded ? "" : " open");
+    write_heading(f, claim);
     html_print(f, " <small>%s%s</small></h3><span class=\"reason\">%s</span></summary>\n",
                is_comparison ? ""
                : expected    ? "as expected"
@@ -127,17 +130,15 @@ bool report_claim(struct page *p, const struct claim_ref *claim, const struct cl
         return false;
     if (expected && p->folded) {
         fputs("<div class=\"maps\"></div>\n", f); /* for the script's maps */
-        report_evidence(f, json, false);
-        fputs("</details>\n</article>\n", f);
-        return true;
+    } else {
+        fputs("<div class=\"maps\">\n", f);
+        write_histogram(f, json);
+        if (!plot_qq(f, json, e))
+            return false;
+        plot_power(f, json);
+        fputs("</div>\n", f);
+        report_evidence_tiles(f, json);
     }
-    fputs("<div class=\"maps\">\n", f);
-    write_histogram(f, json);
-    if (!plot_qq(f, json, e))
-        return false;
-    plot_power(f, json);
-    fputs("</div>\n", f);
-    report_evidence_tiles(f, json);
     report_evidence(f, json, !expected);
     fputs("</details>\n</article>\n", f);
     return true;

@@ -1,4 +1,4 @@
-#include "report_convergence.h"
+#include "report_internal.h"
 
 #include "tools/results/convergence_results.h"
 #include "tools/plots/plot_convergence.h"
@@ -113,28 +113,23 @@ static void write_scene(FILE *f, const json_t *scene)
     fputs("</section>\n", f);
 }
 
-void report_convergence_headline(FILE *f, const json_t *convergence, bool alone)
+void report_convergence_headline(FILE *f, const json_t *results, bool alone)
 {
-    size_t num = 0, judged = 0, wrong = 0, undecided = 0, errors = 0;
-    if (convergence == NULL)
-        return;
-    for (size_t i = 0; i < json_array_size(convergence); i++) {
-        const json_t *engines = json_object_get(json_array_get(convergence, i), "engines");
-        num += json_array_size(engines);
-        for (size_t k = 0; k < json_array_size(engines); k++) {
-            const json_t *j = json_array_get(engines, k);
-            enum outcome o = convergence_results_outcome(j);
-            errors += o == OUTCOME_NOT_JUDGED;
-            wrong += o == OUTCOME_OPPOSITE;
-            undecided += o == OUTCOME_UNDECIDED;
-            judged += json_is_true(json_object_get(j, "judged"));
-        }
+    size_t count[OUTCOME_AS_EXPECTED + 1] = {0}, num = 0, judged = 0;
+    struct results_walk w = {.results = results, .kind = JUDGED_CONVERGENCE};
+    for (; results_next(&w); num++) {
+        count[w.outcome]++;
+        judged += json_is_true(json_object_get(w.json, "judged"));
     }
+    if (num == 0)
+        return;
+    const size_t errors = count[OUTCOME_NOT_JUDGED], wrong = count[OUTCOME_OPPOSITE],
+                 undecided = count[OUTCOME_UNDECIDED];
     const char *tag = alone ? "h1" : "p";
     fprintf(f, "<%s class=\"%s\">", tag,
-            !alone                            ? "lede"
-            : errors + wrong + undecided == 0 ? "good"
-                                              : "bad");
+            !alone                              ? "lede"
+            : count[OUTCOME_AS_EXPECTED] == num ? "good"
+                                                : "bad");
     if (errors > 0)
         fprintf(f, "Convergence: %zu of %zu engines could not be judged, %zu failed.", errors, num,
                 wrong);

@@ -1,4 +1,4 @@
-#include "report_cost.h"
+#include "report_internal.h"
 
 #include "tools/results/render_cost.h"
 #include "tools/html/html.h"

@@ -161,11 +161,8 @@ static void write_table(FILE *f, const struct history *h)
 
 static size_t num_wrong(const struct history_run *run)
 {
-    const json_t *claims = json_object_get(run->results, "claims");
-    size_t wrong = 0;
-    for (size_t i = 0; i < json_array_size(claims); i++)
-        wrong += results_claim_outcome(json_array_get(claims, i)) != OUTCOME_AS_EXPECTED;
-    return wrong;
+    size_t count[OUTCOME_AS_EXPECTED + 1];
+    return results_count(run->results, JUDGED_CLAIM, count) - count[OUTCOME_AS_EXPECTED];
 }
 
 static void write_runs(FILE *f, const struct history *h)

@@ -81,4 +81,42 @@ void report_badge(FILE *f, const struct claim_ref *claim);
 /* The reference's name, and the quantity where it is not the mean. */
 void report_reference(FILE *f, const struct claim_ref *claim);
 
+/* The sections around the scenes, in their order; each is nothing where the results have nothing of it (NULL or empty). */
+
+/* The matrix on top of a page of several scenes: a row for each, with a thumbnail, in the order of the claims, which are those of
+ * the tested program: the one that is neither ours nor a reference, else ours. A cell has a mark, the difference and a link to its
+ * claim, so that colour is not needed. The last column counts the scene's other claims. Nothing for fewer than two scenes. An image
+ * that cannot be read has no thumbnail here; the scene's own section says so. */
+void report_matrix(struct page *p, const struct claim_ref *claim, size_t num);
+
+/* <section id="table"> of num claims in the order given: what each said, in a row that leads to its evidence, and the same as CSV;
+ * table#claims is what page_table.js finds and sorts. */
+void report_table(FILE *f, const struct claim_ref *claim, size_t num, bool folded);
+
+/* What a reader needs to doubt a verdict: numbers, regions, seeds, samples, versions, which statistic looked, with what part of
+ * alpha, and what each found, what the difference looks like, how the noise of both sides compares, and the
+ * commands that run the claim again and approve another reference: <details> of a judged claim, unfolded if `open`. */
+void report_evidence(FILE *f, const json_t *claim, bool open);
+/* The reporting tiles of smallest p as buttons (data-x, data-y: their corner, pixels) that mark the tile
+ * in the images, and an empty line for what the page's script reads there. Nothing if no tile has
+ * noise. */
+void report_evidence_tiles(FILE *f, const json_t *claim);
+
+/* Stated errors ("consistency", stated_error_results.h): how many renderers err as they state, in one line; the table. */
+void report_stated_error_headline(FILE *f, const json_t *consistency);
+void report_stated_error(FILE *f, const json_t *consistency);
+
+/* Noise (noise_results.h): one line for the head of the page; a section with a row for each scene and engine: variance of a
+ * sample, its fall, efficiency. */
+void report_noise_headline(FILE *f, const json_t *noise);
+void report_noise(FILE *f, const json_t *noise);
+
+/* Convergence (convergence_results.h): the verdict in one line, the page's headline if it is about nothing else; for every scene
+ * the plots of RMSE against samples and against CPU time, what was judged, and the rungs behind it. */
+void report_convergence_headline(FILE *f, const json_t *results, bool alone);
+void report_convergence(FILE *f, const json_t *convergence);
+
+/* What the time went to (render_cost.h): a row for each scene, the costliest first; nothing where nothing was rendered. */
+void report_cost(FILE *f, const json_t *results);
+
 #endif

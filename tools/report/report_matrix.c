@@ -1,4 +1,4 @@
-#include "report_matrix.h"
+#include "report_internal.h"
 
 #include "reference/suite/engine_table.h"
 #include "renderer/base/fs.h"
@@ -17,12 +17,12 @@ static bool is_same_scene(const struct claim_ref *a, const struct claim_ref *b)
     return strcmp(member_text(a->json, "scene"), member_text(b->json, "scene")) == 0;
 }
 
-static bool is_reference(const char *name)
+static bool is_first_of_scene(const struct claim_ref *claim, size_t i)
 {
-    bool found = strcmp(name, "truth") == 0;
-    for (int k = 0; engine_names[k] != NULL; k++)
-        found = found || strcmp(name, engine_names[k]) == 0;
-    return found;
+    size_t k = 0;
+    while (!is_same_scene(&claim[k], &claim[i]))
+        k++;
+    return k == i;
 }
 
 static const char *tested_program(const struct claim_ref *claim, size_t num)
@@ -30,7 +30,8 @@ static const char *tested_program(const struct claim_ref *claim, size_t num)
     static const char ours[] = "pathtracer";
     for (size_t i = 0; i < num; i++) {
         const char *a = member_text(claim[i].json, "a");
-        if (strncmp(a, ours, sizeof ours - 1) != 0 && !is_reference(a))
+        if (strncmp(a, ours, sizeof ours - 1) != 0 && strcmp(a, "truth") != 0 &&
+            engine_with_goldens(a) == NULL)
             return a;
     }
     return ours;
@@ -148,13 +149,11 @@ void report_matrix(struct page *p, const struct claim_ref *claim, size_t num)
     const char *column[MOST_COLUMNS], *program = tested_program(claim, num);
     size_t num_columns = 0, scenes = 0;
     for (size_t i = 0; i < num; i++) {
-        size_t k = 0;
-        while (k < i && !is_same_scene(&claim[k], &claim[i]))
-            k++;
-        scenes += k == i;
         const char *b = member_text(claim[i].json, "b");
-        for (k = 0; k < num_columns && strcmp(column[k], b) != 0;)
+        size_t k = 0;
+        while (k < num_columns && strcmp(column[k], b) != 0)
             k++;
+        scenes += is_first_of_scene(claim, i);
         if (is_of(&claim[i], program) && k == num_columns && num_columns < MOST_COLUMNS)
             column[num_columns++] = b;
     }
@@ -168,13 +167,9 @@ void report_matrix(struct page *p, const struct claim_ref *claim, size_t num)
     for (size_t k = 0; k < num_columns; k++)
         html_print(p->f, "<th class=\"num\">against %s</th>", column[k]);
     fputs("<th class=\"num\">others</th></tr></thead>\n<tbody>\n", p->f);
-    for (size_t i = 0; i < num; i++) {
-        size_t k = 0;
-        while (k < i && !is_same_scene(&claim[k], &claim[i]))
-            k++;
-        if (k == i)
+    for (size_t i = 0; i < num; i++)
+        if (is_first_of_scene(claim, i))
             write_row(p, claim, num, &claim[i], program, column, num_columns);
-    }
     fputs(
         "</tbody>\n</table>\n</div>\n<p class=\"caption\">✓ as it should be, ✗ not, ? undecided, "
         "! not judged. The number is how much brighter the image is, in %. Without a word below it "

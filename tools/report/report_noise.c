@@ -1,4 +1,4 @@
-#include "report_noise.h"
+#include "report_internal.h"
 
 #include "tools/html/html.h"
 #include "tools/results/noise_results.h"

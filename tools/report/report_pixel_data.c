@@ -36,6 +36,14 @@ bool report_pixel_data_add(struct page *p, const char *path, const struct moment
     return true;
 }
 
+/* The end of an element's tag, and what it holds. */
+static void write_bytes(FILE *f, const void *bytes, size_t size)
+{
+    fputs("\">", f);
+    html_base64(f, bytes, size);
+    fputs("</script>\n", f);
+}
+
 static void write_colours(FILE *f)
 {
     enum { DIVERGING = 257, SEQUENTIAL = 256 };
@@ -44,9 +52,8 @@ static void write_colours(FILE *f)
         plot_diverging_rgb8(2.0 * i / (DIVERGING - 1) - 1, &colour[3 * i]);
     for (int i = 0; i < SEQUENTIAL; i++)
         plot_sequential_rgb8((double)i / (SEQUENTIAL - 1), &colour[3 * (DIVERGING + i)]);
-    fputs("<script type=\"text/plain\" id=\"colours\">", f);
-    html_base64(f, colour, sizeof colour);
-    fputs("</script>\n", f);
+    fputs("<script type=\"text/plain\" id=\"colours", f);
+    write_bytes(f, colour, sizeof colour);
 }
 
 /* Whether that many bytes, as base64, may still go into the page. */
@@ -68,27 +75,25 @@ void report_pixel_data_write(struct page *p)
             left_out++;
             continue;
         }
-        fprintf(p->f,
-                "<script type=\"text/plain\" id=\"layer-%zu\" data-width=\"%d\" data-height=\"%d\" "
-                "data-n=\"%.9g\" data-spp=\"%.9g\" data-unit=\"",
-                i, l->width, l->height, l->n, l->spp);
-        html_text(p->f, l->unit);
-        fputs("\">", p->f);
-        html_base64(p->f, l->bytes, l->size);
-        fputs("</script>\n", p->f);
+        html_print(p->f,
+                   "<script type=\"text/plain\" id=\"layer-%zu\" data-width=\"%d\" "
+                   "data-height=\"%d\" data-n=\"%.9g\" data-spp=\"%.9g\" data-unit=\"%s",
+                   i, l->width, l->height, l->n, l->spp, l->unit);
+        write_bytes(p->f, l->bytes, l->size);
     }
     for (size_t i = 0; i < p->num_alike; i++) {
         const struct page_alike *n = &p->alike[i];
-        maps += n->bytes != NULL;
-        if (n->bytes == NULL || !has_room(p, n->size)) {
-            maps_left_out += n->bytes != NULL;
+        if (n->bytes == NULL)
+            continue;
+        maps++;
+        if (!has_room(p, n->size)) {
+            maps_left_out++;
             continue;
         }
         fprintf(p->f,
-                "<script type=\"text/plain\" id=\"flip-%zu\" data-width=\"%d\" data-height=\"%d\">",
+                "<script type=\"text/plain\" id=\"flip-%zu\" data-width=\"%d\" data-height=\"%d",
                 n->claim.index, n->width, n->height);
-        html_base64(p->f, n->bytes, n->size);
-        fputs("</script>\n", p->f);
+        write_bytes(p->f, n->bytes, n->size);
     }
     if (left_out > 0)
         fprintf(

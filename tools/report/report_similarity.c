@@ -1,5 +1,6 @@
 #include "report_similarity.h"
 
+#include "tools/html/plot_colour.h"
 #include "tools/images/idiff.h"
 #include "tools/images/pixel_codec.h"
 #include "tools/html/csv_link.h"
@@ -47,11 +48,9 @@ static bool measure_idiff(const struct moments *a, const struct moments *b, doub
 /* As flip_exposures() has it. */
 static bool is_black(const struct moments *m)
 {
-    for (size_t i = 0; i < (size_t)m->width * (size_t)m->height; i++) {
-        const double *v = m->mean + 3 * i;
-        if (0.2126 * v[0] + 0.7152 * v[1] + 0.0722 * v[2] > 0)
+    for (size_t i = 0; i < (size_t)m->width * (size_t)m->height; i++)
+        if (luminance(m->mean + 3 * i) > 0)
             return false;
-    }
     return true;
 }
 

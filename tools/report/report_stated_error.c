@@ -1,4 +1,4 @@
-#include "report_stated_error.h"
+#include "report_internal.h"
 
 #include "tools/results/stated_error_results.h"
 #include "tools/html/html.h"

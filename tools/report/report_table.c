@@ -1,4 +1,4 @@
-#include "report_table.h"
+#include "report_internal.h"
 
 #include "tools/compare/region.h"
 #include "tools/html/csv_link.h"

@@ -136,13 +136,8 @@ static struct plain_words names(const json_t *claims, const char *key, const cha
 static size_t num_scenes(const json_t *claims)
 {
     size_t num = 0;
-    for (size_t i = 0; i < json_array_size(claims); i++) {
-        const char *scene = member_or_empty(json_array_get(claims, i), "scene");
-        bool seen = false;
-        for (size_t k = 0; k < i && !seen; k++)
-            seen = strcmp(member_or_empty(json_array_get(claims, k), "scene"), scene) == 0;
-        num += !seen;
-    }
+    for (size_t i = 0; i < json_array_size(claims); i++)
+        num += results_is_first_of_scene(claims, i);
     return num;
 }
 

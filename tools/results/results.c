@@ -358,6 +358,15 @@ size_t results_num_with_error(const json_t *claims, size_t i)
     return num;
 }
 
+bool results_is_first_of_scene(const json_t *claims, size_t i)
+{
+    const json_t *scene = json_object_get(json_array_get(claims, i), "scene");
+    size_t k = 0;
+    while (k < i && !json_equal(json_object_get(json_array_get(claims, k), "scene"), scene))
+        k++;
+    return k == i;
+}
+
 bool results_claim_lacks_time(const json_t *claim)
 {
     const char *verdict = member_text(claim, "verdict");

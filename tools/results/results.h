@@ -30,6 +30,8 @@ enum outcome { OUTCOME_NOT_JUDGED, OUTCOME_OPPOSITE, OUTCOME_UNDECIDED, OUTCOME_
 enum outcome results_claim_outcome(const json_t *claim);
 /* How many claims have the error of claim i, which has one; 0 if an earlier one has it: it was said. */
 size_t results_num_with_error(const json_t *claims, size_t i);
+/* Is no earlier claim (or row of noise) of its scene? */
+bool results_is_first_of_scene(const json_t *claims, size_t i);
 /* Of a claim that is OUTCOME_NOT_JUDGED: the budget ended before its first look. It has no numbers,
  * like any that was not judged, but counts as INCONCLUSIVE. */
 bool results_claim_lacks_time(const json_t *claim);

@@ -52,10 +52,7 @@ static void print_claims(FILE *f, const json_t *claims)
     fputc('\n', f);
     for (size_t i = 0; i < json_array_size(claims); i++) {
         const char *scene = member_text(json_array_get(claims, i), "scene");
-        bool is_first = true;
-        for (size_t k = 0; k < i && is_first; k++)
-            is_first = strcmp(member_text(json_array_get(claims, k), "scene"), scene) != 0;
-        if (!is_first)
+        if (!results_is_first_of_scene(claims, i))
             continue;
         fprintf(f, "| %s |", scene);
         print_cell(f, find(claims, scene, "truth"));

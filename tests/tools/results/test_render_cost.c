@@ -1,6 +1,6 @@
 /* Costs by scene, from results written by hand; expected sums are added by hand. */
 #include "tools/results/render_cost.h"
-#include "tools/report/report_cost.h"
+#include "tools/report/report_internal.h"
 #include "tests/support/test.h"
 
 /* Two references of one scene share a render of ours; a probe of an engine; a scene that ran out of

@@ -3,7 +3,7 @@
 #include "renderer/math/sampler.h"
 #include "tools/stats/stated_error.h"
 #include "tools/results/stated_error_results.h"
-#include "tools/report/report_stated_error.h"
+#include "tools/report/report_internal.h"
 #include "tests/support/test.h"
 
 #include <gsl/gsl_cdf.h>
