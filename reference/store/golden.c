@@ -127,10 +127,9 @@ bool golden_write(const char *golden_dir, const char *scene, const char *engine,
     bool waits = ok && moments_write(at.next.s, m, attrs, 2, e);
     ok = waits && sha256_file(at.next.s, sha256, e);
     if (ok) {
-        ok = json_object_set_new(entry, "exr_sha256", json_string(sha256)) == 0 &&
-             json_object_set(all, engine, entry) == 0;
-        ok =
-            ok ? json_write(at.manifest.s, all, e) : err_set(e, "%s: out of memory", at.manifest.s);
+        json_object_set_new(entry, "exr_sha256", json_string(sha256));
+        json_object_set(all, engine, entry);
+        ok = json_write(at.manifest.s, all, e);
     }
     if (waits && !ok)
         unlink(at.next.s); /* no manifest names it */

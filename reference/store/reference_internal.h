@@ -11,10 +11,9 @@ bool reference_in_directory(const struct suite_scene *scene, const struct suite_
                             bool (*act)(const struct reference_job *job, void *ctx, struct err *e),
                             void *ctx, struct err *e) __attribute__((warn_unused_result));
 
-/* Adds what every reference's manifest says; false out of memory. */
-bool reference_describe(const struct suite_scene *scene, const struct suite_reference *ref,
+/* Adds what every reference's manifest says. */
+void reference_describe(const struct suite_scene *scene, const struct suite_reference *ref,
                         const struct reference_options *opt, const struct timing *t,
-                        const struct moments *m, json_t *manifest)
-    __attribute__((warn_unused_result));
+                        const struct moments *m, json_t *manifest);
 
 #endif

@@ -79,7 +79,7 @@ static bool engine_render(const struct suite_scene *scene, const struct suite_re
     return false;
 }
 
-bool reference_describe(const struct suite_scene *scene, const struct suite_reference *ref,
+void reference_describe(const struct suite_scene *scene, const struct suite_reference *ref,
                         const struct reference_options *opt, const struct timing *t,
                         const struct moments *m, json_t *manifest)
 {
@@ -89,9 +89,7 @@ bool reference_describe(const struct suite_scene *scene, const struct suite_refe
         m->spp, "width", scene->width, "height", scene->height, "depth", scene->depth, "replicates",
         ref->replicates, "spp", ref->spp, "subgrid", ref->subgrid, "seed", (json_int_t)opt->seed,
         "cpu_s", t->cpu_s, "wall_s", t->wall_s);
-    bool ok = common != NULL && json_object_update(manifest, common) == 0;
-    json_decref(common);
-    return ok;
+    json_object_update_new(manifest, common);
 }
 
 bool reference_render(const struct suite_scene *scene, const struct suite_reference *ref,
@@ -108,15 +106,9 @@ bool reference_render(const struct suite_scene *scene, const struct suite_refere
         return err_prefix(e, "%s, %s", scene->name, ref->engine);
     }
     timing_stop(&t);
-    bool ok = reference_describe(scene, ref, opt, &t, out, m);
-    if (ok && is_truth)
-        ok = json_object_set_new(m, "kind", json_string(ref->kind)) == 0 &&
-             json_object_set(m, "values", ref->values) == 0;
-    if (!ok) {
-        json_decref(m);
-        moments_free(out);
-        return err_set(e, "%s, %s: out of memory", scene->name, ref->engine);
-    }
+    reference_describe(scene, ref, opt, &t, out, m);
+    if (is_truth)
+        json_object_update_new(m, json_pack("{ss,sO}", "kind", ref->kind, "values", ref->values));
     *manifest = m;
     return true;
 }

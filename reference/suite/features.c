@@ -253,12 +253,6 @@ bool features_check_axes(const char *engine, const struct camera *c, struct err 
     return true;
 }
 
-bool features_check_camera(const char *engine, const struct scene *s, const struct camera *c,
-                           struct err *e)
-{
-    return features_check_axes(engine, c, e) && features_check_clipping(engine, s, c, e);
-}
-
 bool features_check_normals(const char *engine, const struct scene *s, struct err *e)
 {
     for (uint32_t i = 0; i < s->num_triangles; i++) {
@@ -285,6 +279,6 @@ bool features_check_exportable(const char *engine, const struct scene *s, const 
 {
     if (c->is_orthographic)
         return err_set(e, "%s: an orthographic camera cannot be expressed", engine);
-    return features_check_camera(engine, s, c, e) && features_check_normals(engine, s, e) &&
-           features_check_textures(engine, s, e);
+    return features_check_axes(engine, c, e) && features_check_clipping(engine, s, c, e) &&
+           features_check_normals(engine, s, e) && features_check_textures(engine, s, e);
 }

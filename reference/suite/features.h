@@ -57,16 +57,13 @@ bool features_clip_depths(const char *engine, const struct scene *s, const struc
 /* Where the camera's pixels are not square or its axes not orthogonal. */
 bool features_check_axes(const char *engine, const struct camera *c, struct err *e)
     __attribute__((warn_unused_result));
-/* Clipping and axes. */
-bool features_check_camera(const char *engine, const struct scene *s, const struct camera *c,
-                           struct err *e) __attribute__((warn_unused_result));
 /* Where a shading normal of a vertex is on the back of its triangle. */
 bool features_check_normals(const char *engine, const struct scene *s, struct err *e)
     __attribute__((warn_unused_result));
 /* Where a material has a texture. */
 bool features_check_textures(const char *engine, const struct scene *s, struct err *e)
     __attribute__((warn_unused_result));
-/* Camera, normals and textures. */
+/* Axes, clipping, normals and textures. */
 bool features_check_exportable(const char *engine, const struct scene *s, const struct camera *c,
                                struct err *e) __attribute__((warn_unused_result));
 

@@ -103,16 +103,15 @@ static bool run(const struct settings *s, const struct diagnose_gather_options *
 {
     int num = 0;
     json_t *skipped = json_array();
-    bool ok = skipped != NULL || err_set(e, "out of memory");
-    ok = ok && gather(s, g, clue, &num, skipped, e) &&
-         diagnose(g->catalogue, clue, num, &s->diagnose, d, e);
+    bool ok = gather(s, g, clue, &num, skipped, e) &&
+              diagnose(g->catalogue, clue, num, &s->diagnose, d, e);
     if (ok && !s->quiet)
         diagnose_print(stdout, g->catalogue, clue, num, d, skipped);
     if (ok && !s->quiet && s->view == NULL && d->finding == FINDING_UNKNOWN)
         ok = tell_place(s, e);
     if (ok && s->json != NULL) {
         json_t *root = diagnose_print_json(g->catalogue, clue, num, d, skipped);
-        ok = (root != NULL || err_set(e, "out of memory")) && json_write(s->json, root, e);
+        ok = json_write(s->json, root, e);
         json_decref(root);
     }
     json_decref(skipped);

@@ -285,8 +285,6 @@ bool claim_traits_collect(const json_t *results, const char *suite_dir, struct t
     struct suite suite = {0};
     bool differs = false;
     *out = (struct traits){.num = NUM_FIXED, .json = all_claims(results)};
-    if (out->json == NULL)
-        return err_set(e, "out of memory");
     for (size_t i = 0; i < json_array_size(out->json); i++)
         differs = differs || is_wrongly_different(json_array_get(out->json, i));
     if (!differs)

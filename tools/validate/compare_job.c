@@ -10,7 +10,6 @@
 
 #include "renderer/base/fs.h"
 
-#include <limits.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -363,21 +362,14 @@ static json_t *same_program_json(const struct compared *c, int filter_width)
 }
 
 /* The report reads moments: of a side that is none, they are written beside the results. */
-static bool side_file(const struct compared *c, int side, const char *json, char *out, size_t size,
+static bool side_file(const struct compared *c, int side, const char *json, struct path *out,
                       struct err *e)
 {
-    const char *slash = strrchr(json, '/');
-    if (c->is_file[side]) {
-        char full[PATH_MAX];
-        if (realpath(c->path[side], full) == NULL || strlen(full) >= size)
-            return err_set(e, "%s: its full path is not known", c->path[side]);
-        strcpy(out, full);
-        return true;
-    }
-    snprintf(out, size, "%s.%c.exr", json, "ab"[side]);
-    bool ok = moments_write(out, &c->m[side], NULL, 0, e);
-    snprintf(out, size, "%s.%c.exr", slash != NULL ? slash + 1 : json, "ab"[side]);
-    return ok;
+    if (c->is_file[side])
+        return realpath(c->path[side], out->s) != NULL ||
+               err_set(e, "%s: its full path is not known", c->path[side]);
+    *out = fs_path("%s.%c.exr", fs_base(json), "ab"[side]);
+    return moments_write(fs_path("%s.%c.exr", json, "ab"[side]).s, &c->m[side], NULL, 0, e);
 }
 
 static struct claim_context context_of(const struct compare_job *job)
@@ -401,17 +393,15 @@ bool compare_job_write_json(const struct compare_job *job, const struct compared
     struct claim_context context = context_of(job);
     if (job->same_program && !c->has_means)
         return err_set(e, "%s: needs means that can be compared (see the note)", path);
-    char side[2][4096];
-    const char *slash = strrchr(path, '/'), *base = slash != NULL ? slash + 1 : path;
-    const struct path z = fs_path("%s.z.exr", path);
-    const struct path relative = fs_path("%s.relative.exr", path);
+    struct path side[2];
+    const char *base = fs_base(path);
     json_t *root = claim_result_new_results(argc, argv, job->opt.alpha, e);
     if (root == NULL)
         return false;
-    if (!fs_make_parent_dirs(path, e) || !image_write_exr(z.s, &c->r.z, e) ||
-        !image_write_exr(relative.s, &c->r.relative, e) ||
-        !side_file(c, 0, path, side[0], sizeof side[0], e) ||
-        !side_file(c, 1, path, side[1], sizeof side[1], e)) {
+    if (!fs_make_parent_dirs(path, e) ||
+        !image_write_exr(fs_path("%s.z.exr", path).s, &c->r.z, e) ||
+        !image_write_exr(fs_path("%s.relative.exr", path).s, &c->r.relative, e) ||
+        !side_file(c, 0, path, &side[0], e) || !side_file(c, 1, path, &side[1], e)) {
         json_decref(root);
         return false;
     }
@@ -429,10 +419,10 @@ bool compare_job_write_json(const struct compare_job *job, const struct compared
     if (ok && job->same_program)
         ok = json_object_set_new(claim, "same_program", same_program_json(c, job->filter_width)) ==
              0;
-    ok = ok &&
-         json_object_set_new(claim, "files",
-                             json_pack("{s:s, s:s, s:s+, s:s+}", "a", side[0], "b", side[1], "z",
-                                       base, ".z.exr", "relative", base, ".relative.exr")) == 0;
+    ok = ok && json_object_set_new(claim, "files",
+                                   json_pack("{s:s, s:s, s:s+, s:s+}", "a", side[0].s, "b",
+                                             side[1].s, "z", base, ".z.exr", "relative", base,
+                                             ".relative.exr")) == 0;
     ok = ok && json_array_append(json_object_get(root, "claims"), claim) == 0;
     if (!ok)
         err_set(e, "%s: out of memory", path);

@@ -155,10 +155,10 @@ static bool is_filtered(const struct validation *v, const struct suite_scene *s,
 }
 
 /* Of all scenes, so that each part of a run says the same. */
-static bool init_peers(struct validation *v, struct err *e)
+static void init_peers(struct validation *v)
 {
     v->left_out = json_object();
-    for (int i = 0; v->left_out != NULL && i < v->suite.num_scenes; i++) {
+    for (int i = 0; i < v->suite.num_scenes; i++) {
         struct scene_sides *own = &v->sides[i];
         const struct suite_scene *s = &v->suite.scene[i];
         own->filtered = *s;
@@ -179,7 +179,6 @@ static bool init_peers(struct validation *v, struct err *e)
                 json_integer(1 + json_integer_value(json_object_get(v->left_out, name))));
         }
     }
-    return v->left_out != NULL || err_set(e, "out of memory");
 }
 
 static void init_sides(struct validation *v)
@@ -319,12 +318,9 @@ bool select_claims(struct validation *v, json_t *cannot, struct err *e)
     init_sides(v);
     bool ok = ask_engine(v, can, cannot, e);
     if (ok && v->opt->engine != NULL && v->opt->engine->filter.radius > 0)
-        ok = init_peers(v, e);
-    int most = 0;
+        init_peers(v);
     v->num_tasks = 0;
-    for (int i = 0; ok && i < v->suite.num_scenes; i++)
-        most += scene_is_selected(v->opt, v->suite.scene[i].name) ? MAX_CLAIMS : 0;
-    v->task = ok ? calloc((size_t)most + 1, sizeof *v->task) : NULL;
+    v->task = calloc(num * MAX_CLAIMS, sizeof *v->task);
     ok = ok && (v->task != NULL || err_set(e, "out of memory"));
     bool of_noise = noise_ladder_is_kept(v->opt->golden_dir, &v->suite);
     for (int i = 0; ok && i < v->suite.num_scenes; i++)

@@ -3,7 +3,6 @@
 #include "claim_traits.h"
 
 #include <math.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -69,26 +68,12 @@ static void find_places(const struct traits *t, struct place best[MOST_KEPT])
         }
 }
 
-struct text {
-    char *s;
-    size_t size, used;
-};
-
-static __attribute__((format(printf, 2, 3))) void append(struct text *to, const char *format, ...)
-{
-    va_list args;
-    va_start(args, format);
-    if (to->used < to->size)
-        to->used += (size_t)vsnprintf(to->s + to->used, to->size - to->used, format, args);
-    va_end(args);
-}
-
-static void name_place(const struct traits *t, uint64_t bits, struct text *to)
+static void name_place(const struct traits *t, uint64_t bits, FILE *to)
 {
     const char *between = "";
     for (int i = 0; i < t->num; i++)
         if (bits & bit(i)) {
-            append(to, "%s%s", between, t->name[i]);
+            fprintf(to, "%s%s", between, t->name[i]);
             between = " with ";
         }
 }
@@ -103,7 +88,7 @@ static void count(const struct traits *t, uint64_t bits, int *differ, int *agree
     }
 }
 
-static void name_scenes(const struct traits *t, struct text *to)
+static void name_scenes(const struct traits *t, FILE *to)
 {
     const char *last = "", *between = " Scenes: ";
     int num = 0;
@@ -113,29 +98,29 @@ static void name_scenes(const struct traits *t, struct text *to)
             continue;
         last = c->scene;
         if (++num <= MOST_NAMED)
-            append(to, "%s%s", between, c->scene);
+            fprintf(to, "%s%s", between, c->scene);
         between = ", ";
     }
     if (num > MOST_NAMED)
-        append(to, " and %d more", num - MOST_NAMED);
-    append(to, ".");
+        fprintf(to, " and %d more", num - MOST_NAMED);
+    fprintf(to, ".");
 }
 
-static void tell_place(const struct traits *t, uint64_t bits, struct text *to)
+static void tell_place(const struct traits *t, uint64_t bits, FILE *to)
 {
     int all = t->num_claims - t->num_differ, differ, agree;
     count(t, bits, &differ, &agree);
     if (differ < t->num_differ)
-        append(to, "Of the %d claims that differ %d have ", t->num_differ, differ);
+        fprintf(to, "Of the %d claims that differ %d have ", t->num_differ, differ);
     else if (differ == 1)
-        append(to, "The claim that differs has ");
+        fprintf(to, "The claim that differs has ");
     else
-        append(to, "All %d claims that differ have ", differ);
+        fprintf(to, "All %d claims that differ have ", differ);
     name_place(t, bits, to);
     if (agree == 0)
-        append(to, "; none of the %d that agree has.", all);
+        fprintf(to, "; none of the %d that agree has.", all);
     else
-        append(to, "; %d of the %d that agree have, too.", agree, all);
+        fprintf(to, "; %d of the %d that agree have, too.", agree, all);
 }
 
 static int num_scenes(const struct traits *t)
@@ -146,20 +131,22 @@ static int num_scenes(const struct traits *t)
     return num;
 }
 
-static void tell(const struct traits *t, struct text *to)
+static void tell(const struct traits *t, FILE *to)
 {
     struct place best[MOST_KEPT];
     find_places(t, best);
     if (best[0].bits == 0 && t->num_differ == t->num_claims)
-        append(to,
-               "Every claim differs, all %d: look at what all scenes need, such as the camera, the "
-               "loader, the film.",
-               t->num_claims);
+        fprintf(
+            to,
+            "Every claim differs, all %d: look at what all scenes need, such as the camera, the "
+            "loader, the film.",
+            t->num_claims);
     else if (best[0].bits == 0 && num_scenes(t) < FEW_SCENES)
-        append(to, "%d claims differ and %d agree; what those have in common shows in more scenes.",
-               t->num_differ, t->num_claims - t->num_differ);
+        fprintf(to,
+                "%d claims differ and %d agree; what those have in common shows in more scenes.",
+                t->num_differ, t->num_claims - t->num_differ);
     else if (best[0].bits == 0)
-        append(
+        fprintf(
             to,
             "The %d claims that differ have nothing in common that the %d that agree lack: look at "
             "what all scenes need, such as the camera, the loader, the film.",
@@ -178,19 +165,19 @@ static void tell(const struct traits *t, struct text *to)
         /* A part of what has been told already, unless that makes the difference. */
         if ((best[i].bits & best[0].bits) == best[0].bits && agree > 0)
             continue;
-        append(to, told++ == 1 ? " Nearly as likely: " : "; or ");
+        fputs(told++ == 1 ? " Nearly as likely: " : "; or ", to);
         if (told > MOST_TOLD) {
-            append(to, "others");
+            fprintf(to, "others");
             break;
         }
         if (best[i].bits == 0) {
-            append(to, "nothing that they share");
+            fprintf(to, "nothing that they share");
             continue;
         }
         name_place(t, best[i].bits, to);
-        append(to, " (%d of those that differ, %d of the others)", differ, agree);
+        fprintf(to, " (%d of those that differ, %d of the others)", differ, agree);
     }
-    append(to, told > 1 ? "." : "");
+    fputs(told > 1 ? "." : "", to);
     name_scenes(t, to);
 }
 
@@ -198,11 +185,15 @@ bool shared_features_tell(const json_t *results, const char *suite_dir, char *te
                           struct err *e)
 {
     struct traits t;
-    *text = '\0';
+    memset(text, 0, size);
     if (!claim_traits_collect(results, suite_dir, &t, e))
         return false;
-    if (t.num_differ > 0)
-        tell(&t, &(struct text){text, size, 0});
+    FILE *to = t.num_differ > 0 ? fmemopen(text, size - 1, "w") : NULL;
+    bool ok = to != NULL || t.num_differ == 0 || err_set(e, "out of memory");
+    if (to != NULL) {
+        tell(&t, to);
+        fclose(to); /* what does not fit is left out */
+    }
     claim_traits_free(&t);
-    return true;
+    return ok;
 }

@@ -97,20 +97,17 @@ static bool show_so_far(struct validation *v, const json_t *root, struct err *e)
     if (!(v->opt->show_every_s > 0) || now_seconds() < v->shown + v->opt->show_every_s)
         return true;
     json_t *copy = json_copy((json_t *)root), *claims = json_array();
-    bool ok = copy != NULL && claims != NULL && json_object_set(copy, "claims", claims) == 0;
-    if (!ok)
-        err_set(e, "out of memory");
-    if (ok)
-        collect(v, copy);
+    bool ok = true;
+    json_object_set_new(copy, "claims", claims);
+    collect(v, copy);
     int left = v->num_tasks;
     for (int i = 0; i < v->num_tasks; i++)
         left -= v->task[i].result != NULL;
-    if (ok && left > 0 && json_array_size(claims) > 0) {
+    if (left > 0 && json_array_size(claims) > 0) {
         json_object_set_new(copy, "unfinished", json_integer(left));
         json_object_set_new(copy, "page_every_s", json_real(v->opt->show_every_s));
         ok = v->opt->show(copy, v->opt, e);
     }
-    json_decref(claims);
     json_decref(copy);
     v->shown = now_seconds();
     return ok;
@@ -154,17 +151,13 @@ static int stages_of(const struct validate_options *o)
 bool validate_start(const struct validate_options *o, int argc, char **argv, json_t **results,
                     struct err *e)
 {
-    json_t *root = claim_result_new_results(argc, argv, o->alpha, e);
-    if (root == NULL)
-        return false;
-    json_object_set_new(root, "mode", json_string(o->live ? "live" : "golden"));
-    if (o->live)
-        json_object_set_new(root, "reference_seed", json_integer(o->reference_seed));
-    json_object_set_new(root, "stages", json_integer(stages_of(o)));
-    if (o->budget_s > 0)
-        json_object_set_new(root, "budget_s", json_real(o->budget_s));
-    *results = root;
-    return true;
+    *results = claim_result_new_results(argc, argv, o->alpha, e);
+    json_object_update_new(*results, json_pack("{ss,so*,si,so*}", "mode",
+                                               o->live ? "live" : "golden", "reference_seed",
+                                               o->live ? json_integer(o->reference_seed) : NULL,
+                                               "stages", stages_of(o), "budget_s",
+                                               o->budget_s > 0 ? json_real(o->budget_s) : NULL));
+    return *results != NULL;
 }
 
 static void validation_free(struct validation *v)
@@ -197,8 +190,8 @@ static bool check_loader(const struct validation *v, const struct import_options
     for (int i = 0; scene != NULL && i < v->suite.num_scenes; i++)
         if (scene_is_selected(v->opt, v->suite.scene[i].name))
             scene[num++] = &v->suite.scene[i];
-    bool ok = scene != NULL || err_set(e, "out of memory");
-    ok = ok && import_check(scene, num, io, loader, e);
+    bool ok =
+        (scene != NULL || err_set(e, "out of memory")) && import_check(scene, num, io, loader, e);
     free(scene);
     return ok;
 }
