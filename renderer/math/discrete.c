@@ -34,3 +34,10 @@ uint32_t discrete_pick(const uint32_t *end, uint32_t n, float u)
     }
     return lo;
 }
+
+uint32_t discrete_pick_part(const uint32_t *end, uint32_t n, float u, float *part)
+{
+    const uint32_t i = discrete_pick(end, n, u), first = i > 0 ? end[i - 1] : 0;
+    *part = (u * DISCRETE_STEPS - (float)first + 0.5f) / (float)(end[i] - first);
+    return i;
+}

@@ -20,6 +20,9 @@ double discrete_build(const double *weight, uint32_t n, uint32_t *end);
 /* u in [0, 1). Never a thing of weight 0. */
 uint32_t discrete_pick(const uint32_t *end, uint32_t n, float u);
 
+/* The same; *part, 0 to 1: where u lies among the steps of what is picked. */
+uint32_t discrete_pick_part(const uint32_t *end, uint32_t n, float u, float *part);
+
 static inline float discrete_probability(const uint32_t *end, uint32_t i)
 {
     return (float)(end[i] - (i > 0 ? end[i - 1] : 0)) * (1.0f / DISCRETE_STEPS);

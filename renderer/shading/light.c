@@ -1,6 +1,7 @@
 #include "light.h"
 
 #include "light_simd.h"
+#include "renderer/math/discrete.h"
 
 #include <assert.h>
 #include <stdlib.h>
@@ -77,24 +78,66 @@ static bool build_records(struct light_table *t, const struct scene *s)
     return true;
 }
 
-static double light_power(const struct scene *s, const struct light *l)
+/* Of a light's triangles: the sphere, the cone, and what they send along its axis. */
+static void bound_triangles(const struct scene *s, const struct light *l, struct light_bounds *b)
 {
-    const double pi = 3.14159265358979323846;
-    double r = 0.5 * (double)length(sub(s->bounds_max, s->bounds_min));
-    if (scene_num_primitives(s) == 0)
-        r = 1; /* nothing is lit, whichever is chosen */
-    const double r2 = r * r;
-    double falloff = (double)l->attenuation[0] + r * l->attenuation[1] + r2 * l->attenuation[2];
-    switch (l->kind) {
-    case LIGHT_POINT: return 4 * pi * rgb_luminance(l->value) / falloff * r2;
-    case LIGHT_SPOT: {
-        double n = (double)l->exponent + 1;
-        return 2 * pi * (1 - pow(l->cos_cutoff, n)) / n * rgb_luminance(l->value) / falloff * r2;
+    const vec3 *p = s->position + 3 * (size_t)l->first;
+    vec3 least = p[0], most = p[0], facing = {0, 0, 0};
+    for (uint32_t i = 0; i < l->count; i++) {
+        for (int k = 0; k < 3; k++) {
+            least = vmin(least, p[3 * i + (uint32_t)k]);
+            most = vmax(most, p[3 * i + (uint32_t)k]);
+        }
+        facing = mad(facing, 0.5f / l->area,
+                     cross(sub(p[3 * i + 1], p[3 * i]), sub(p[3 * i + 2], p[3 * i])));
     }
-    case LIGHT_DIRECTIONAL: return pi * r2 * rgb_luminance(l->value);
+    const float flat = length(facing);
+    b->centre = scale(add(least, most), 0.5f);
+    b->axis = flat > 0 ? scale(facing, 1 / flat) : b->axis;
+    for (uint32_t i = 0; i < 3 * l->count; i++)
+        b->radius = maxf(b->radius, length(sub(p[i], b->centre)));
+    /* A closed surface shows a quarter of itself on the average, a leaf that shines on both sides half. */
+    const bool both_sides = material_of(s, l)->radiance_both_sides;
+    b->value *= both_sides ? 0.5 : (double)maxf(flat, 0.25f);
+    b->angle = both_sides || !(flat > 0) ? PI_F : 0;
+    for (uint32_t i = 0; b->angle < PI_F && i < l->count; i++) {
+        const vec3 ng = normalize(cross(sub(p[3 * i + 1], p[3 * i]), sub(p[3 * i + 2], p[3 * i])));
+        b->angle = maxf(b->angle, acosf(maxf(-1, minf(1, dot(b->axis, ng)))));
+    }
+}
+
+/* For the choice: the luminance of the irradiance from it on what faces it, and how that falls off. */
+static struct light_bounds light_bounds(const struct scene *s, const struct light *l)
+{
+    struct light_bounds b = {.near = true,
+                             .centre = l->position,
+                             .axis = {0, 0, 1},
+                             .angle = PI_F,
+                             .even = 1,
+                             .falloff = {l->attenuation[0], l->attenuation[1], l->attenuation[2]},
+                             .value = rgb_luminance(l->value)};
+    switch (l->kind) {
+    case LIGHT_POINT: return b;
+    case LIGHT_SPOT:
+        b.axis = l->axis;
+        b.angle = 0;
+        b.reach = l->cos_cutoff;
+        b.even = maxf(0, 1 - l->exponent);
+        return b;
+    case LIGHT_DIRECTIONAL:
+    case LIGHT_ENVIRONMENT:
+        b.near = false;
+        b.falloff[0] = 1;
+        b.falloff[1] = b.falloff[2] = 0;
+        b.centre = l->to_light;
+        if (l->kind == LIGHT_ENVIRONMENT) {
+            /* All around, sqrt(2) of it by light_choice_simd.h; a plane gets a quarter on the average. */
+            b.value = environment_total(s->environment) / 4 / sqrt(2);
+            b.radius = 2;
+        }
+        return b;
     case LIGHT_TRIANGLES:
     case LIGHT_SPHERE: break;
-    case LIGHT_ENVIRONMENT: return pi * r2 * environment_total(s->environment);
     }
     const struct material *m = material_of(s, l);
     double mean = light_luminance(s, l);
@@ -102,21 +145,34 @@ static double light_power(const struct scene *s, const struct light *l)
     if (l->textured)
         mean = fmax(mean, 1e-3 * rgb_luminance(rgb_mul(
                                      m->radiance, texture_max(&s->textures[m->radiance_map - 1]))));
-    return (m->radiance_both_sides ? 2 : 1) * pi * (double)l->area * mean;
+    b.falloff[0] = b.falloff[1] = 0;
+    b.falloff[2] = 1;
+    b.value = (double)l->area * mean;
+    if (l->kind == LIGHT_TRIANGLES) {
+        b.even = 0;
+        bound_triangles(s, l, &b);
+    } else {
+        b.centre = s->spheres[l->first].centre;
+        b.radius = s->spheres[l->first].radius;
+        b.value /= 4;
+    }
+    return b;
 }
 
-/* NULL if none of them has power; *ok false if that is for want of memory. */
-static uint32_t *build_choice(const struct scene *s, bool only_delta, double *power, bool *ok)
+/* Over all lights, or those that are delta lights; NULL if out of memory. */
+static struct light_clusters *build_choice(const struct scene *s, bool only_delta)
 {
-    for (uint32_t l = 0; l < s->num_lights; l++)
-        power[l] = only_delta && !light_is_delta(&s->lights[l]) ? 0 : light_power(s, &s->lights[l]);
-    uint32_t *end = malloc(((size_t)s->num_lights + 1) * sizeof *end);
-    *ok = end != NULL;
-    if (*ok && (s->num_lights == 0 || !(discrete_build(power, s->num_lights, end) > 0))) {
-        free(end);
-        end = NULL;
+    struct light_bounds *b = malloc(((size_t)s->num_lights + 1) * sizeof *b);
+    struct light_clusters *t = NULL;
+    for (uint32_t l = 0; b != NULL && l < s->num_lights; l++) {
+        b[l] = light_bounds(s, &s->lights[l]);
+        if (only_delta && !light_is_delta(&s->lights[l]))
+            b[l].value = 0;
     }
-    return end;
+    if (b != NULL)
+        t = light_clusters_build(b, s->num_lights);
+    free(b);
+    return t;
 }
 
 struct light_table *light_table_build(const struct scene *s, struct err *e)
@@ -126,18 +182,10 @@ struct light_table *light_table_build(const struct scene *s, struct err *e)
         return NULL;
     }
     struct light_table *t = calloc(1, sizeof *t);
-    double *power = malloc(((size_t)s->num_lights + 1) * sizeof *power);
-    bool ok = t != NULL && power != NULL;
-    if (ok) {
+    if (t != NULL)
         t->scene = s;
-        ok = build_records(t, s);
-    }
-    if (ok)
-        t->all = build_choice(s, false, power, &ok);
-    if (ok)
-        t->delta = build_choice(s, true, power, &ok);
-    free(power);
-    if (!ok) {
+    if (t == NULL || !build_records(t, s) || (t->all = build_choice(s, false)) == NULL ||
+        (t->delta = build_choice(s, true)) == NULL) {
         light_table_free(t);
         err_set(e, "out of memory for the lights");
         return NULL;
@@ -153,23 +201,30 @@ void light_table_free(struct light_table *t)
         return;
     free(t->lamp);
     free(t->first);
-    free(t->all);
-    free(t->delta);
+    light_clusters_free(t->all);
+    light_clusters_free(t->delta);
     free(t);
 }
 
-struct light_choice light_choose(const struct light_table *t, bool only_delta, float u)
+struct light_choice light_choose(const struct light_table *t, bool only_delta, vec3 p, vec3 n,
+                                 float u)
 {
-    const uint32_t *end = only_delta ? t->delta : t->all;
-    if (end == NULL)
-        return (struct light_choice){0};
-    uint32_t l = discrete_pick(end, t->scene->num_lights, u);
-    return (struct light_choice){l, discrete_probability(end, l)};
+    const struct light_clusters *c = only_delta ? t->delta : t->all;
+    struct light_choice choice = {0};
+    float weight, all, within;
+    const int cluster = choose_cluster(c, p, n, u, &weight, &all, &u);
+    if (all > 0) {
+        choice.light = choose_in_cluster(c, cluster, &u, &within);
+        choice.probability = weight / all * within;
+    }
+    return choice;
 }
 
-float light_choice_probability(const struct light_table *t, uint32_t l)
+float light_choice_probability(const struct light_table *t, uint32_t l, vec3 p, vec3 n)
 {
-    return t->all != NULL ? discrete_probability(t->all, l) : 0;
+    float weight, all, rest;
+    choose_cluster(t->all, p, n, 0, &weight, &all, &rest);
+    return chosen_probability(t->all, l, p, n, all);
 }
 
 uint32_t light_count_areas(const struct light_table *t)

@@ -9,7 +9,7 @@
 #include "renderer/scene/scene.h"
 #include "renderer/scene/shape.h"
 
-/* With more lights than this, a sample goes to one of them chosen by power, not to each. */
+/* With more lights than this, a sample goes to one of them chosen by place, not to each. */
 enum { MANY_LIGHTS = 16 };
 
 struct light_table; /* per-scene tables for choosing lights and triangles; opaque */
@@ -19,23 +19,18 @@ struct light_table *light_table_build(const struct scene *s, struct err *e)
     __attribute__((warn_unused_result));
 void light_table_free(struct light_table *t);
 
-/* A light and the probability with which it was chosen; 0: none has any power. */
+/* A light and the probability with which it was chosen; 0: none. */
 struct light_choice {
     uint32_t light;
     float probability;
 };
 
-/* One light, in proportion to its power: the luminance of the flux that it sends into the scene,
- * in watts, with R the radius of the ball around the scene's bounding box.
- *   point         4 pi value / (att[0] + att[1] R + att[2] R^2) R^2, which is 4 pi value if physical
- *   spot          the same with 2 pi (1 - cos_cutoff^(exponent+1)) / (exponent+1) for 4 pi
- *   directional   pi R^2 value
- *   triangles, sphere   pi radiance area, twice if both sides emit; textured: about the mean radiance
- *   environment   pi R^2 times its radiance summed over directions
- * only_delta: among the delta lights alone. */
-struct light_choice light_choose(const struct light_table *t, bool only_delta, float u);
-/* The probability that light_choose(t, false, ..) has for light l. */
-float light_choice_probability(const struct light_table *t, uint32_t l);
+/* One light for the place p with the unit normal n, in proportion to about the irradiance (its luminance) that comes from
+ * it (light_choice.h); never one that sends nothing to that side. only_delta: among the delta lights alone. 0 <= u < 1. */
+struct light_choice light_choose(const struct light_table *t, bool only_delta, vec3 p, vec3 n,
+                                 float u);
+/* The probability that light_choose(t, false, ..) has for light l there. */
+float light_choice_probability(const struct light_table *t, uint32_t l, vec3 p, vec3 n);
 /* How many are no delta lights. */
 uint32_t light_count_areas(const struct light_table *t);
 

@@ -3,7 +3,7 @@
 #define ASSAY_LIGHT_SIMD_H
 
 #include "light.h"
-#include "renderer/math/discrete.h"
+#include "light_choice_simd.h"
 #include "renderer/math/warp.h"
 #include "renderer/scene/cs184_deviations.h"
 #include "renderer/scene/environment.h"
@@ -22,8 +22,7 @@ struct light_table {
     const struct scene *scene;
     float *lamp;     /* records of the triangles of all lights */
     uint32_t *first; /* by light: its first record */
-    /* Choices among all lights and among the delta lights; NULL where there is nothing to choose. */
-    uint32_t *all, *delta;
+    struct light_clusters *all, *delta; /* choices among all lights and among the delta lights */
     uint32_t num_areas;
 };
 

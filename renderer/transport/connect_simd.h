@@ -217,6 +217,36 @@ INLINE int connect_rows(const struct integrator *it, struct batch *b, int first,
     return rays;
 }
 
+/* What else is lit is found by other means. */
+INLINE bool samples_only_delta(const struct integrator *it)
+{
+    return it->opt.direct != DIRECT_LIGHT && it->opt.direct != DIRECT_MIS;
+}
+
+/* Lanes that sample lights choose one by their fourth numbers, and leave there what is left of these. */
+static __attribute__((noinline)) void choose(const struct integrator *it, struct batch *b, int n)
+{
+    const struct light_clusters *t = samples_only_delta(it) ? it->lights->delta : it->lights->all;
+    for (int k = 0; k < n; k += LANES) {
+        unsigned mask = scattering(b, k);
+        if (!mask)
+            continue;
+        vf u = vf_load_any(b->numbers[3] + k), weight, all;
+        vi cluster = choose_cluster(t, v3_load(&b->p, k), v3_load(&b->ns, k), u, &weight, &all, &u);
+        mask &= bits(vf_lt(vf_set(0), all));
+        vf_store_any(b->numbers[3] + k, u);
+        vf_store_any(b->choice_weight + k, all);
+        vf_store_any(b->choice_probability + k, vf_set(0));
+        for (; mask; mask &= mask - 1) {
+            const int i = __builtin_ctz(mask);
+            float within;
+            b->choice[k + i] =
+                choose_in_cluster(t, LANE(cluster, i), b->numbers[3] + k + i, &within);
+            b->choice_probability[k + i] = within * (LANE(weight, i) / LANE(all, i));
+        }
+    }
+}
+
 /* Samples a light from every lane that is not mirror-like, for as many lanes at a time as all these shadow
  * rays have room for. */
 static void connect_light(const struct integrator *it, struct batch *b, int n, int vertex,
@@ -233,6 +263,8 @@ static void connect_light(const struct integrator *it, struct batch *b, int n, i
         const int end = n - first < most ? n : first + most;
         draw_numbers(it, b, first, end,
                      (struct draws){vertex + 1, what.purpose, what.num, .used = used});
+        if (what.chosen)
+            choose(it, b, n);
         if (simple)
             sample_lamp_rows(b, first, end, &what);
         int rays = simple ? connect_rows(it, b, first, end, &what, true)
@@ -241,20 +273,6 @@ static void connect_light(const struct integrator *it, struct batch *b, int n, i
         for (int k = first, j = 0; k < end; k += LANES, j += what.num)
             add_visible(b, k, j, what.num);
     }
-}
-
-/* Every lane chooses a light. */
-static void choose(const struct integrator *it, struct batch *b, int n, int vertex,
-                   uint32_t purpose, bool only_delta)
-{
-    draw_numbers(it, b, 0, n, (struct draws){vertex + 1, purpose, 1, .used = 2});
-    for (int k = 0; k < n; k += LANES)
-        for (unsigned mask = b->goes_on[k / LANES]; mask; mask &= mask - 1) {
-            int i = k + __builtin_ctz(mask);
-            struct light_choice c = light_choose(it->lights, only_delta, b->numbers[0][i]);
-            b->choice[i] = c.light;
-            b->choice_probability[i] = c.probability;
-        }
 }
 
 /* One uniform direction of the hemisphere from every lane that is not mirror-like, as one of `count` each; counts if it
@@ -310,10 +328,9 @@ static void connect(const struct integrator *it, struct batch *b, int n, int ver
 {
     const struct scene *s = it->scene;
     uint32_t purpose = PURPOSE_LIGHT;
-    bool only_delta = it->opt.direct != DIRECT_LIGHT && it->opt.direct != DIRECT_MIS;
+    const bool only_delta = samples_only_delta(it);
     const bool chooses = chooses_light(it);
     for (int k = 0; chooses && k < it->opt.light_samples; k++) {
-        choose(it, b, n, vertex, purpose++, only_delta);
         connect_light(
             it, b, n, vertex,
             (struct light_samples){

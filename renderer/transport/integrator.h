@@ -29,7 +29,7 @@ enum direct_kind {
 enum many_lights {
     LIGHTS_AUTO, /* all up to MANY_LIGHTS of them, else one */
     LIGHTS_ALL,  /* light_samples of each; one of each delta light */
-    LIGHTS_ONE   /* light_samples times one light, chosen by power */
+    LIGHTS_ONE   /* light_samples times one light, chosen by place */
 };
 
 /* How paths end before max_bounces, without changing a mean [Arvo90]. */
@@ -90,12 +90,15 @@ struct batch {
     struct rgbs shadow_light; /* what the shadow ray brings if nothing is in between */
     bool occluded[BATCH_ROOM];
     struct vec3s p, ng, ns, wo; /* of the hit; normals turned to the side of wo */
+    /* Where the ray comes from, if one of many lights was chosen there: ns, and the weight of all. */
+    struct vec3s from_n;
+    float from_weight[BATCH_ROOM];
     float eps[BATCH_ROOM];
     bool front[BATCH_ROOM];
     uint32_t material[BATCH_ROOM];
     uint16_t active[BATCH_ROOM], shadow_lane[BATCH_ROOM];
     uint32_t choice[BATCH_ROOM]; /* of a light */
-    float choice_probability[BATCH_ROOM];
+    float choice_probability[BATCH_ROOM], choice_weight[BATCH_ROOM];
     /* Paths that go on are kept side by side: whose path a lane is, and what it has gathered. */
     uint32_t slot[BATCH_ROOM], slot_pixel[BATCH_ROOM], slot_sample[BATCH_ROOM];
     float numbers
@@ -110,7 +113,7 @@ struct batch {
 
 void integrate(const struct integrator *it, struct batch *b, int num_lanes);
 
-/* One light, chosen by power, is sampled at a vertex and not each of them. */
+/* One light, chosen by place, is sampled at a vertex and not each of them. */
 static inline bool chooses_light(const struct integrator *it)
 {
     switch (it->opt.many_lights) {

@@ -107,7 +107,9 @@ INLINE vf emission_weight(const struct integrator *it, const struct batch *b, in
         if (s == NULL)
             LANE(pdf_light, i) = environment_pdf_w(it->scene->environment, v3_lane(&d, i));
         if (chooses_light(it))
-            LANE(pdf_light, i) *= light_choice_probability(it->lights, (uint32_t)light[i]);
+            LANE(pdf_light, i) *=
+                chosen_probability(it->lights->all, (uint32_t)light[i], vec3s_get(&b->ray.o, k + i),
+                                   vec3s_get(&b->from_n, k + i), b->from_weight[k + i]);
     }
     return vf_select(certain, one,
                      power_heuristic(pdf_w, (float)it->opt.light_samples * pdf_light));

@@ -410,7 +410,7 @@ static void only_lamp(struct scene *s, uint32_t k)
     check_finish(s);
 }
 
-/* 45_many_lights: with all lamps one is chosen by power at each vertex, alone a lamp is always sampled.
+/* 45_many_lights: with all lamps one is chosen by place at each vertex, alone a lamp is always sampled.
  * What is seen of the lamps themselves is left out. Control: without one of the weakest lamps, which
  * are 48 in all. */
 TEST(many_lamps_are_the_sum_of_single_ones)

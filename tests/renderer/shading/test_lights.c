@@ -358,7 +358,6 @@ TEST(spot_light)
     }
 }
 
-/* A lamp of every kind, with their powers; R is half the diagonal of the bounds. */
 /* A lamp of forty triangles, one after the other along x, of heights 1 to 13 and so of uneven areas. Numbers in equal
  * steps find each in proportion to its area, to one step at either end, and the density is that of a point of the whole:
  * d^2 / (cos area), with cos = 1/d at a distance of 1. */
@@ -398,82 +397,164 @@ TEST(triangles_of_a_mesh_lamp_by_area)
     scene_free(&s);
 }
 
-TEST(choice_is_by_power)
+static void add_spot(struct scene *s, vec3 at, vec3 axis)
+{
+    build_light(s, (struct light){.kind = LIGHT_SPOT,
+                                  .value = {3, 3, 3},
+                                  .position = at,
+                                  .attenuation = {0, 0, 1},
+                                  .axis = axis,
+                                  .cos_cutoff = 0.6f,
+                                  .exponent = 1});
+}
+
+/* At a plate's middle a lamp of each kind is chosen in proportion to its irradiance there, a closed form each: I cos/d^2,
+ * of small lamps L A cos cos/d^2 (within 1 %), of a small sphere L pi r^2 cos/d^2, of a constant sky pi L; and lights below it,
+ * or that look away, not at all. */
+TEST(choice_is_by_irradiance)
 {
     struct err e;
     struct scene s = plate(v3(0, 1, 0), 0.5f);
+    const vec3 up = v3(0, 1, 0), down = v3(0, -1, 0), at = v3(1, 1, 0);
+    const float falls[][3] = {{0, 0, 1}, {2, 0, 0}};
+    for (int k = 0; k < 2; k++)
+        build_light(&s, (struct light){.kind = LIGHT_POINT,
+                                       .value = {1, 1, 1},
+                                       .position = at,
+                                       .attenuation = {falls[k][0], falls[k][1], falls[k][2]}});
     build_light(&s, (struct light){.kind = LIGHT_POINT,
-                                   .value = {1, 1, 1},
-                                   .position = {0, 1, 0},
+                                   .value = {9, 9, 9},
+                                   .position = {0, -0.5f, 0},
                                    .attenuation = {0, 0, 1}});
-    build_light(&s, (struct light){.kind = LIGHT_POINT,
-                                   .value = {1, 1, 1},
-                                   .position = {0, 1, 0},
-                                   .attenuation = {2, 0, 0}});
-    build_light(&s, (struct light){.kind = LIGHT_SPOT,
-                                   .value = {3, 3, 3},
-                                   .position = {0, 1, 0},
-                                   .attenuation = {0, 0, 1},
-                                   .axis = {0, -1, 0},
-                                   .cos_cutoff = 0.6f,
-                                   .exponent = 2.5f});
+    add_spot(&s, v3(0.5f, 1, 0), down);
+    add_spot(&s, v3(0.5f, 1, 0), up);
     build_light(
-        &s, (struct light){.kind = LIGHT_DIRECTIONAL, .value = {0, 2, 0}, .to_light = {0, 1, 0}});
+        &s,
+        (struct light){.kind = LIGHT_DIRECTIONAL, .value = {0, 2, 0}, .to_light = {0.6f, 0.8f, 0}});
+    build_light(&s,
+                (struct light){.kind = LIGHT_DIRECTIONAL, .value = {0, 2, 0}, .to_light = down});
     build_light(&s, (struct light){.kind = LIGHT_POINT, .attenuation = {1, 0, 0}});
-    give_sky(&s, environment_constant(grey(0.3f), &e));
-    uint32_t one = build_material(&s, grey(0), grey(4)), two = build_material(&s, grey(0), grey(4));
-    s.materials[two].radiance_both_sides = true;
-    build_quad(&s, v3(0, 2, 0), v3(0.5f, 0, 0), v3(0, 0, 0.5f), one);
-    build_quad(&s, v3(1, 2, 0), v3(0.5f, 0, 0), v3(0, 0, 0.5f), two);
-    build_sphere(&s, v3(-1, 2, 0), 0.25f, 1, one);
+    give_sky(&s, environment_constant(grey(0.1f), &e));
+    uint32_t lamp = build_material(&s, grey(0), grey(16000));
+    build_quad(&s, v3(0.995f, 2, -0.005f), v3(0.01f, 0, 0), v3(0, 0, 0.01f), lamp);
+    build_quad(&s, v3(0.995f, 2, -0.005f), v3(0, 0, 0.01f), v3(0.01f, 0, 0), lamp);
+    build_sphere(&s, v3(-1, 2, 0), 0.005f, 1, lamp);
     check_finish(&s);
     assert_int_equal(s.num_dark_lights, 1);
-    vec3 box = sub(s.bounds_max, s.bounds_min);
-    double r2 = 0.25 * (double)dot(box, box), spot = 0;
-    /* The spot's intensity over directions, by quadrature. */
-    gsl_integration_glfixed_table *table = gsl_integration_glfixed_table_alloc(20);
-    assert_non_null(table);
-    for (size_t i = 0; i < 20; i++) {
-        double z, w;
-        gsl_integration_glfixed_point(0.6, 1, i, &z, &w, table);
-        spot += 2 * M_PI * 3 * w * pow(z, 2.5);
-    }
-    gsl_integration_glfixed_table_free(table);
-    const double power[] = {4 * M_PI,
-                            4 * M_PI * r2 / 2,
-                            spot,
-                            M_PI * r2 * 2 * 0.7152,
-                            0,
-                            M_PI * r2 * 4 * M_PI * 0.3,
-                            M_PI * 4 * 0.25,
-                            2 * M_PI * 4 * 0.25,
-                            M_PI * 4 * 4 * M_PI * 0.0625};
-    enum { N = sizeof power / sizeof *power };
+    const double slant = 1 / sqrt(1.25);
+    const double part[] = {1 / (2 * sqrt(2)),
+                           0.5 / sqrt(2),
+                           0,
+                           3 * slant * slant / 1.25,
+                           0,
+                           2 * 0.7152 * 0.8,
+                           0,
+                           0,
+                           M_PI * 0.1,
+                           16000 * 0.0001 * (4. / 5) / 5,
+                           0,
+                           16000 * M_PI * 0.000025 * (2 / sqrt(5)) / 5};
+    enum { N = sizeof part / sizeof *part };
     assert_int_equal(s.num_lights, N);
     struct light_table *t = light_table_build(&s, &e);
     assert_non_null(t);
     assert_int_equal(light_count_areas(t), 4);
     double all = 0, delta = 0;
     for (int i = 0; i < N; i++) {
-        all += power[i];
-        delta += light_is_delta(&s.lights[i]) ? power[i] : 0;
+        all += part[i];
+        delta += light_is_delta(&s.lights[i]) ? part[i] : 0;
     }
+    const vec3 p = v3(0, 0, 0);
     for (uint32_t i = 0; i < N; i++)
-        assert_true(fabs((double)light_choice_probability(t, i) - power[i] / all) < 2e-6);
-    /* As often as that, and with that probability; never the dark one, never an area light among
-     * the delta lights. 65536 numbers in equal steps. */
+        assert_near(light_choice_probability(t, i, p, up), part[i] / all, 0.01 * part[i] / all);
+    /* As often as that, and with that probability. 65536 numbers in equal steps. */
     uint32_t count[2][N] = {{0}};
     for (int d = 0; d < 2; d++)
         for (int k = 0; k < 65536; k++) {
-            struct light_choice c = light_choose(t, d != 0, (float)k / 65536);
+            struct light_choice c = light_choose(t, d != 0, p, up, (float)k / 65536);
             assert_true(c.light < N && c.probability > 0);
             count[d][c.light]++;
         }
-    for (int i = 0; i < N; i++) {
+    for (uint32_t i = 0; i < N; i++) {
         bool is_delta = light_is_delta(&s.lights[i]);
-        assert_true(fabs(count[0][i] / 65536. - power[i] / all) < 1e-4);
-        assert_true(fabs(count[1][i] / 65536. - (is_delta ? power[i] / delta : 0)) < 1e-4);
+        assert_near(count[0][i] / 65536., light_choice_probability(t, i, p, up), 1e-4);
+        assert_near(count[1][i] / 65536., is_delta ? part[i] / delta : 0, 2e-3);
     }
+    /* From below only the point light and the sun of the other side, and the sky, which is all around. */
+    for (uint32_t i = 0; i < N; i++)
+        assert_int_equal(light_choice_probability(t, i, p, down) > 0, i == 2 || i == 6 || i == 8);
+    light_table_free(t);
+    scene_free(&s);
+}
+
+static vec3 random_vec3(uint32_t i, uint32_t k)
+{
+    const struct sample4 u = sampler_get(11, i, k, 0, 0);
+    return v3(2 * u.u[0] - 1, 2 * u.u[1] - 1, 2 * u.u[2] - 1);
+}
+
+/* 300 spots, points, spheres and lamps of any size and direction in a cube, 200 places in it with normals: whatever a light's own
+ * sample finds before the surface, that light may be chosen there; probabilities sum to 1, and lights come as often as they say
+ * (4096 numbers in equal steps, of which each of 32 clusters may gain or lose one at its ends, and each light of it another).
+ * Control: with the normal turned round, lights that send something are left out. */
+TEST(no_light_is_left_out)
+{
+    enum { N = 300, PLACES = 200, STEPS = 4096 };
+    struct err e;
+    struct scene s = build_scene();
+    for (uint32_t i = 0; i < N / 3; i++) {
+        const vec3 at = random_vec3(i, 0), axis = normalize(random_vec3(i, 1));
+        build_light(&s, (struct light){.kind = i % 2 ? LIGHT_POINT : LIGHT_SPOT,
+                                       .value = grey(1 + at.x),
+                                       .position = at,
+                                       .attenuation = {0.1f, 0, 1},
+                                       .axis = axis,
+                                       .cos_cutoff = 0.9f * fabsf(at.y),
+                                       .exponent = 2 * fabsf(at.z)});
+    }
+    for (uint32_t i = N / 3; i < N; i++) {
+        const vec3 at = random_vec3(i, 0), size = scale(random_vec3(i, 1), i % 7 ? 0.1f : 0.7f);
+        uint32_t m = build_material(&s, grey(0), grey(3 + at.z));
+        s.materials[m].radiance_both_sides = i % 5 == 0;
+        if (i % 3)
+            build_quad(&s, at, size, scale(random_vec3(i, 2), 0.1f), m);
+        else
+            build_sphere(&s, at, length(size), i % 2 ? 1 : -1, m);
+    }
+    build_camera(&s, v3(0, 0, 0), 40);
+    check_finish(&s);
+    assert_int_equal(s.num_lights, N);
+    struct light_table *t = light_table_build(&s, &e);
+    assert_non_null(t);
+    int left_out = 0, found = 0, never = 0;
+    for (uint32_t k = 0; k < PLACES; k++) {
+        const vec3 p = random_vec3(N + k, 0), n = normalize(random_vec3(N + k, 1));
+        double sum = 0, probability[N];
+        int count[N] = {0};
+        for (uint32_t l = 0; l < N; l++) {
+            sum += probability[l] = (double)light_choice_probability(t, l, p, n);
+            never += probability[l] == 0;
+            for (uint32_t i = 0; i < 4; i++) {
+                const struct light_sample ls =
+                    light_sample_direction(t, l, p, sampler_get(12, k, l, i, 0).u);
+                if (!(ls.pdf_w > 0 && dot(ls.wi, n) > 0 && rgb_max(ls.radiance) > 0))
+                    continue;
+                found++;
+                if (probability[l] == 0)
+                    fail_msg("light %u is never chosen at place %u", l, k);
+                left_out += light_choice_probability(t, l, p, neg(n)) == 0;
+            }
+        }
+        assert_near(sum, 1, 1e-5);
+        for (int i = 0; i < STEPS; i++) {
+            struct light_choice c = light_choose(t, false, p, n, ((float)i + 0.5f) / STEPS);
+            assert_near(c.probability / probability[c.light], 1, 1e-2);
+            count[c.light]++;
+        }
+        for (int l = 0; l < N; l++)
+            assert_near(count[l], STEPS * probability[l], 2.1);
+    }
+    assert_true(found > 10000 && left_out > 100 && never > 100);
     light_table_free(t);
     scene_free(&s);
 }
@@ -498,7 +579,7 @@ static double rectangle_irradiance(vec3 p, float width, float depth)
 
 /* 60 point lights below 40 rectangular lamps that face down, of powers from 1 to 1000, over a
  * plate: nothing is in anything's way, so the sum of the closed forms. All of them sampled, one
- * chosen by power, and what the renderer does by itself, which is the latter to the bit. */
+ * chosen by place, and what the renderer does by itself, which is the latter to the bit. */
 TEST(a_hundred_lights)
 {
     struct scene s = plate(v3(0, 1, 0), 0.6f);
