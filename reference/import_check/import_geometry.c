@@ -95,15 +95,15 @@ static bool weld(struct check *c, struct err *e)
 {
     size_t corners = 3 * (size_t)c->pair->s->num_triangles + 1;
     c->num_buckets = 2 * (uint32_t)corners;
-    c->corner_vertex = malloc(corners * sizeof *c->corner_vertex);
-    c->vertex = malloc(corners * sizeof *c->vertex);
-    c->next = malloc(corners * sizeof *c->next);
-    c->first_use = malloc(corners * sizeof *c->first_use);
-    c->next_use = malloc(corners * sizeof *c->next_use);
-    c->bucket = malloc(c->num_buckets * sizeof *c->bucket);
-    if (c->corner_vertex == NULL || c->vertex == NULL || c->next == NULL || c->first_use == NULL ||
-        c->next_use == NULL || c->bucket == NULL)
+    /* All as one block: the vertices, then lists of numbers. */
+    c->vertex = malloc(corners * (sizeof *c->vertex + 6 * sizeof *c->next));
+    if (c->vertex == NULL)
         return err_set(e, "import check: out of memory");
+    c->corner_vertex = (uint32_t *)(c->vertex + corners);
+    c->next = c->corner_vertex + corners;
+    c->first_use = c->next + corners;
+    c->next_use = c->first_use + corners;
+    c->bucket = c->next_use + corners; /* twice as many */
     for (uint32_t b = 0; b < c->num_buckets; b++)
         c->bucket[b] = none;
     for (uint32_t k = 0; k < 3 * c->pair->s->num_triangles; k++) {
@@ -112,16 +112,6 @@ static bool weld(struct check *c, struct err *e)
         c->first_use[v] = k;
     }
     return true;
-}
-
-static void check_free(struct check *c)
-{
-    free(c->corner_vertex);
-    free(c->vertex);
-    free(c->next);
-    free(c->first_use);
-    free(c->next_use);
-    free(c->bucket);
 }
 
 /* One polygon of Blender's. */
@@ -289,6 +279,6 @@ bool import_geometry_compare(struct import_pair *pair, const json_t *meshes, boo
     bool ok = weld(&c, e);
     for (size_t i = 0; ok && i < json_array_size(meshes); i++)
         ok = check_mesh(&c, json_array_get(meshes, i), e);
-    check_free(&c);
+    free(c.vertex);
     return ok;
 }

@@ -1,11 +1,11 @@
 #include "export_mitsuba.h"
 
+#include "reference/replicates/replicate_images.h"
 #include "reference/suite/features.h"
 #include "mitsuba_xml.h"
 
 #include "renderer/scene/environment.h"
 #include "renderer/base/fs.h"
-#include "renderer/image/image.h"
 
 #include <assert.h>
 #include <gsl/gsl_math.h>
@@ -27,14 +27,6 @@ static void filename(struct writer *w, const char *ending)
 {
     mitsuba_text(w->xml, "string", "filename", fs_path("%s_%s", w->base, ending).s);
 }
-
-static bool write_image(const struct writer *w, const char *ending, const struct image *im,
-                        struct err *e)
-{
-    return image_write_exr(fs_path("%s_%s", w->stem, ending).s, im, e);
-}
-
-static const char *const RGB_NAMES[3] = {"R", "G", "B"};
 
 /* As check_filter() has let through. */
 static void put_filter(struct writer *w, const struct pixel_filter *f)
@@ -87,14 +79,9 @@ static bool put_index(struct writer *w, const char *name, uint32_t material, rgb
         return true;
     }
     char ending[64];
-    struct image im;
+    rgb px[4] = {value, value, value, value};
     snprintf(ending, sizeof ending, "material_%u_%s.exr", material, name);
-    if (!image_alloc(&im, 2, 2, 3, RGB_NAMES, e))
-        return false;
-    for (size_t i = 0; i < 4; i++)
-        memcpy(im.data + 3 * i, &(float[3]){value.r, value.g, value.b}, 3 * sizeof *im.data);
-    bool ok = write_image(w, ending, &im, e);
-    image_free(&im);
+    bool ok = replicate_images_write(fs_path("%s_%s", w->stem, ending).s, 2, 2, &px->r, e);
     mitsuba_begin(w->xml, "texture", "bitmap", "name", name);
     filename(w, ending);
     mitsuba_text(w->xml, "string", "filter_type", "nearest");
@@ -268,23 +255,23 @@ static bool put_object(struct writer *w, uint32_t index, struct err *e)
  * for each of ours every kink of our interpolation falls on a row or column, and the two agree. */
 static bool put_sky_image(struct writer *w, int width, int height, struct err *e)
 {
-    struct image im;
-    if (!image_alloc(&im, width, 2 * height + 1, 3, RGB_NAMES, e))
-        return false;
-    for (int y = 0; y < im.height; y++)
+    const int rows = 2 * height + 1;
+    rgb *px = malloc((size_t)width * (size_t)rows * sizeof *px);
+    if (px == NULL)
+        return err_set(e, "out of memory");
+    for (int y = 0; y < rows; y++)
         for (int x = 0; x < width; x++) {
             /* Next to the poles, where our interpolation is constant, directions keep their
              * longitude. */
-            double row = fmin(fmax(y, 0.5), im.height - 1.5), theta = M_PI * row / (im.height - 1);
+            double row = fmin(fmax(y, 0.5), rows - 1.5), theta = M_PI * row / (rows - 1);
             double phi = 2 * M_PI * (width - 1 - x + 0.5) / width;
             vec3 d = v3((float)(-cos(phi) * sin(theta)), (float)cos(theta),
                         (float)(sin(phi) * sin(theta)));
-            rgb l = environment_radiance(w->s->environment, d);
-            memcpy(im.data + 3 * ((size_t)y * (size_t)width + (size_t)x),
-                   &(float[3]){l.r, l.g, l.b}, 3 * sizeof *im.data);
+            px[(size_t)y * (size_t)width + (size_t)x] = environment_radiance(w->s->environment, d);
         }
-    bool ok = write_image(w, "environment.exr", &im, e);
-    image_free(&im);
+    bool ok =
+        replicate_images_write(fs_path("%s_environment.exr", w->stem).s, width, rows, &px->r, e);
+    free(px);
     mitsuba_begin(w->xml, "emitter", "envmap", NULL, NULL);
     filename(w, "environment.exr");
     mitsuba_transform(w->xml, v3(0, 0, -1), v3(0, 1, 0), v3(1, 0, 0), v3(0, 0, 0));

@@ -4,6 +4,7 @@
 #include "povray_replicates.h"
 #include "reference/base/process.h"
 
+#include "renderer/base/parallel.h"
 #include "renderer/base/sha256.h"
 #include "renderer/base/fs.h"
 
@@ -18,9 +19,8 @@ struct crew {
     const struct povray_replicates *set;
     const struct reference_job *job; /* of the set */
     const char *program;
-    int first, last; /* of the images that are wanted */
+    int first; /* of the images that are wanted */
     pthread_mutex_t lock;
-    int next;
     bool failed;
     struct err why; /* of the first failure */
 };
@@ -145,17 +145,15 @@ static bool run_task(struct crew *w, int t, struct err *e)
     return ok;
 }
 
-static void *work(void *arg)
+static void work(void *ctx, size_t first, size_t last)
 {
-    struct crew *w = arg;
-    for (;;) {
-        pthread_mutex_lock(&w->lock);
-        int t = w->failed || w->next == w->last ? -1 : w->next++;
-        pthread_mutex_unlock(&w->lock);
-        if (t < 0)
-            return NULL;
+    struct crew *w = ctx;
+    for (size_t t = first; t < last; t++) {
         struct err e = {0};
-        if (run_task(w, t, &e))
+        pthread_mutex_lock(&w->lock);
+        bool failed = w->failed;
+        pthread_mutex_unlock(&w->lock);
+        if (failed || run_task(w, w->first + (int)t, &e))
             continue;
         pthread_mutex_lock(&w->lock);
         if (!w->failed)
@@ -163,27 +161,6 @@ static void *work(void *arg)
         w->failed = true;
         pthread_mutex_unlock(&w->lock);
     }
-}
-
-/* All tasks, on up to opt->threads threads, this one included. */
-static bool run_crew(struct crew *w, struct err *e)
-{
-    pthread_t thread[64];
-    int n = w->job->opt->threads - 1, started = 0;
-    pthread_mutex_init(&w->lock, NULL);
-    for (int i = 0; i < n && i < 64; i++) {
-        if (pthread_create(&thread[started], NULL, work, w) != 0)
-            break; /* fewer then */
-        started++;
-    }
-    work(w);
-    for (int i = 0; i < started; i++)
-        pthread_join(thread[i], NULL);
-    pthread_mutex_destroy(&w->lock);
-    if (!w->failed)
-        return true;
-    *e = w->why;
-    return err_prefix(e, "POV-Ray");
 }
 
 /* "POV-Ray 3.7.0.10.unofficial": the first line that begins so. */
@@ -215,13 +192,21 @@ static bool render(const struct reference_job *job, int first, int last, json_t 
 {
     char program[4096], version[128], sha256[65];
     struct povray_replicates set;
-    struct crew w = {.set = &set, .job = job, .program = program, .first = first, .last = last};
+    struct crew w = {.set = &set,
+                     .job = job,
+                     .program = program,
+                     .first = first,
+                     .lock = PTHREAD_MUTEX_INITIALIZER};
     if (!process_find("povray", program, sizeof program))
         return err_set(e, "povray: no such program in PATH (POV-Ray 3.7)");
     if (!povray_replicates(job, &set, e))
         return false;
-    w.next = first;
-    if (!run_crew(&w, e) || !engine_version(&w, version, e) || !sha256_file(program, sha256, e))
+    parallel_for(job->opt->threads, (size_t)(last - first), work, &w);
+    if (w.failed) {
+        *e = w.why;
+        return err_prefix(e, "POV-Ray");
+    }
+    if (!engine_version(&w, version, e) || !sha256_file(program, sha256, e))
         return false;
     json_object_set_new(said, "version", json_string(version));
     json_object_set_new(said, "binary_sha256", json_string(sha256));

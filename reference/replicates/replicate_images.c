@@ -25,39 +25,27 @@ float *replicate_images_read(const char *path, int width, int height, bool below
     bool half;
     if (!image_read_exr(path, &im, &half, e))
         return NULL;
-    size_t pixels = (size_t)im.width * (size_t)im.height;
-    float *rgb_out = NULL;
-    int at[3];
-    for (int c = 0; c < 3; c++)
-        at[c] = image_channel(&im, names[c]);
-    if (im.width != width || im.height != height) {
+    const size_t values = 3 * (size_t)im.width * (size_t)im.height;
+    const int at[3] = {image_channel(&im, "R"), image_channel(&im, "G"), image_channel(&im, "B")};
+    bool ok =
+        (im.width == width && im.height == height) ||
         err_set(e, "%s: %d x %d pixels, not %d x %d", path, im.width, im.height, width, height);
-        goto out;
+    ok = ok && ((!half && at[0] >= 0 && at[1] >= 0 && at[2] >= 0) ||
+                err_set(e, "%s: not the 32-bit R, G, B that was asked for", path));
+    float *rgb_out = ok ? malloc(values * sizeof *rgb_out) : NULL;
+    ok = ok && (rgb_out != NULL || err_set(e, "%s: out of memory", path));
+    for (size_t i = 0; ok && i < values; i++) {
+        rgb_out[i] = im.data[i / 3 * (size_t)im.channels + (size_t)at[i % 3]];
+        ok = (isfinite(rgb_out[i]) && (rgb_out[i] >= 0 || below_zero)) ||
+             err_set(e, "%s: pixel %d,%d is %s", path, (int)(i / 3 % (size_t)im.width),
+                     (int)(i / 3 / (size_t)im.width),
+                     below_zero ? "not finite" : "negative or not finite");
     }
-    if (half || at[0] < 0 || at[1] < 0 || at[2] < 0) {
-        err_set(e, "%s: not the 32-bit R, G, B that was asked for", path);
-        goto out;
-    }
-    rgb_out = malloc(3 * pixels * sizeof *rgb_out);
-    if (rgb_out == NULL) {
-        err_set(e, "%s: out of memory", path);
-        goto out;
-    }
-    for (size_t i = 0; i < 3 * pixels; i++) {
-        float v = im.data[i / 3 * (size_t)im.channels + (size_t)at[i % 3]];
-        if (!isfinite(v) || (v < 0 && !below_zero)) {
-            err_set(e, "%s: pixel %d,%d is %s", path, (int)(i / 3 % (size_t)im.width),
-                    (int)(i / 3 / (size_t)im.width),
-                    below_zero ? "not finite" : "negative or not finite");
-            free(rgb_out);
-            rgb_out = NULL;
-            goto out;
-        }
-        rgb_out[i] = v;
-    }
-out:
     image_free(&im);
-    return rgb_out;
+    if (ok)
+        return rgb_out;
+    free(rgb_out);
+    return NULL;
 }
 
 bool replicate_images_write(const char *path, int width, int height, const float *pixels_rgb,

@@ -21,12 +21,12 @@ double truth_furnace(double emission, double albedo, int depth)
     return emission * sum;
 }
 
-static bool fill_furnace(const struct suite_scene *scene, json_t *values, struct moments *out,
-                         struct err *e)
+static bool fill_furnace(const struct suite_scene *scene, const struct suite_reference *ref,
+                         struct moments *out, struct err *e)
 {
     double emission[3], albedo[3];
     json_error_t why;
-    if (json_unpack_ex(values, &why, JSON_STRICT, "{s:[F,F,F], s:[F,F,F]}", "emission",
+    if (json_unpack_ex(ref->values, &why, JSON_STRICT, "{s:[F,F,F], s:[F,F,F]}", "emission",
                        &emission[0], &emission[1], &emission[2], "albedo", &albedo[0], &albedo[1],
                        &albedo[2]) != 0)
         return err_set(e, "%s", why.text);
@@ -73,7 +73,7 @@ bool truth_render(const struct suite_scene *scene, const struct suite_reference 
         m.spp = 0;
         for (size_t i = 0; i < (size_t)m.width * (size_t)m.height; i++)
             m.n[i] = 1;
-        ok = truth_knows(scene, ref, e) && find_kind(ref->kind)->fill(scene, ref->values, &m, e);
+        ok = truth_knows(scene, ref, e) && find_kind(ref->kind)->fill(scene, ref, &m, e);
     }
     if (!ok) {
         moments_free(&m);

@@ -29,11 +29,11 @@ bool truth_render(const struct suite_scene *scene, const struct suite_reference 
 double truth_furnace(double emission, double albedo, int depth);
 
 /* A closed form by name. fill() sets all of out->mean, out->width x out->height pixels, from
- * `values`; of the scene it may use depth, lens_radius and focal_distance, and where it says so the filter. */
+ * ref->values; of the scene it may use depth, lens_radius and focal_distance, and where it says so the filter. */
 struct truth_kind {
     const char *name;
-    bool (*fill)(const struct suite_scene *scene, json_t *values, struct moments *out,
-                 struct err *e);
+    bool (*fill)(const struct suite_scene *scene, const struct suite_reference *ref,
+                 struct moments *out, struct err *e);
     bool by_any_filter; /* else of the box of one pixel alone */
 };
 

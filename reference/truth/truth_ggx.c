@@ -5,6 +5,7 @@
 #include <gsl/gsl_chebyshev.h>
 #include <gsl/gsl_integration.h>
 #include <gsl/gsl_math.h>
+#include <string.h>
 
 /* The albedo, a smooth function of the cosine, is computed at CHEBYSHEV + 1 cosines by POINTS x POINTS
  * points, and checked between them by more. (GSL has these two rules as tables, in full precision.) */
@@ -149,14 +150,14 @@ static bool ggx_values(json_t *values, json_t **view, struct ggx_sphere *s, stru
            truth_check_triple("k", s->k, HUGE_VAL, e);
 }
 
-static bool fill_sphere(const struct facets *facets, const struct suite_scene *scene,
-                        json_t *values, struct moments *out, struct err *e)
+static bool fill_sphere(const struct suite_scene *scene, const struct suite_reference *ref,
+                        struct moments *out, struct err *e)
 {
-    struct ggx_sphere s = {.facets = facets};
+    struct ggx_sphere s = {.facets = strcmp(ref->kind, "ggx_sphere") == 0 ? &ggx : &beckmann};
     struct truth_view view;
     double min_cos;
     json_t *v;
-    if (!ggx_values(values, &v, &s, e) || !truth_view_read(v, scene, &view, e) ||
+    if (!ggx_values(ref->values, &v, &s, e) || !truth_view_read(v, scene, &view, e) ||
         !truth_view_filled(&view, s.centre, s.radius, &min_cos, e))
         return false;
     if (scene->depth < 1)
@@ -167,17 +168,5 @@ static bool fill_sphere(const struct facets *facets, const struct suite_scene *s
     return ok;
 }
 
-static bool fill_ggx(const struct suite_scene *scene, json_t *values, struct moments *out,
-                     struct err *e)
-{
-    return fill_sphere(&ggx, scene, values, out, e);
-}
-
-static bool fill_beckmann(const struct suite_scene *scene, json_t *values, struct moments *out,
-                          struct err *e)
-{
-    return fill_sphere(&beckmann, scene, values, out, e);
-}
-
 const struct truth_kind truth_ggx[] = {
-    {"ggx_sphere", fill_ggx, true}, {"beckmann_sphere", fill_beckmann, true}, {0}};
+    {"ggx_sphere", fill_sphere, true}, {"beckmann_sphere", fill_sphere, true}, {0}};

@@ -68,14 +68,14 @@ static double panel_share(const struct panel *p, const struct suite_scene *s, do
                                  -unit * ny * dy);
 }
 
-static bool fill_lens_steps(const struct suite_scene *scene, json_t *values, struct moments *out,
-                            struct err *e)
+static bool fill_lens_steps(const struct suite_scene *scene, const struct suite_reference *ref,
+                            struct moments *out, struct err *e)
 {
     double background[3], foot_x[2], foot_y[2];
     struct panel panel[MAX_PANELS];
     json_t *panels;
     json_error_t why;
-    if (json_unpack_ex(values, &why, JSON_STRICT, "{s:[F,F,F], s:o, s:{s:[F,F], s:[F,F]}}",
+    if (json_unpack_ex(ref->values, &why, JSON_STRICT, "{s:[F,F,F], s:o, s:{s:[F,F], s:[F,F]}}",
                        "background", &background[0], &background[1], &background[2], "panels",
                        &panels, "footprint", "x", &foot_x[0], &foot_x[1], "y", &foot_y[0],
                        &foot_y[1]) != 0)

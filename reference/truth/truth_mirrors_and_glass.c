@@ -137,11 +137,11 @@ static bool box_values(json_t *values, struct truth_mirror_box *b, struct err *e
     return b->tan_half > 0 || err_set(e, "tan_half is %g, not above 0", b->tan_half);
 }
 
-static bool fill_mirror_box(const struct suite_scene *scene, json_t *values, struct moments *out,
-                            struct err *e)
+static bool fill_mirror_box(const struct suite_scene *scene, const struct suite_reference *ref,
+                            struct moments *out, struct err *e)
 {
     struct truth_mirror_box b = {0};
-    if (!box_values(values, &b, e))
+    if (!box_values(ref->values, &b, e))
         return false;
     if (out->width != out->height)
         return err_set(e, "the image is %d x %d, not square", out->width, out->height);
@@ -196,15 +196,15 @@ static int slab_radiance(const void *form, const double eye[3], const double d[3
     return d[2] < 0;
 }
 
-static bool fill_slab(const struct suite_scene *scene, json_t *values, struct moments *out,
-                      struct err *e)
+static bool fill_slab(const struct suite_scene *scene, const struct suite_reference *ref,
+                      struct moments *out, struct err *e)
 {
     struct slab s = {.depth = scene->depth};
     struct truth_view view;
     json_error_t why;
     json_t *v;
-    if (json_unpack_ex(values, &why, JSON_STRICT, "{s:o, s:F, s:[F,F,F], s:[F,F,F]}", "view", &v,
-                       "ior", &s.n, "front", &s.front[0], &s.front[1], &s.front[2], "behind",
+    if (json_unpack_ex(ref->values, &why, JSON_STRICT, "{s:o, s:F, s:[F,F,F], s:[F,F,F]}", "view",
+                       &v, "ior", &s.n, "front", &s.front[0], &s.front[1], &s.front[2], "behind",
                        &s.behind[0], &s.behind[1], &s.behind[2]) != 0)
         return err_set(e, "%s", why.text);
     if (!truth_view_read(v, scene, &view, e) ||
@@ -305,15 +305,15 @@ static bool sphere_values(json_t *values, json_t **view, struct truth_glass_sphe
     return s->n > 1 || err_set(e, "ior is %g, not above 1", s->n);
 }
 
-static bool fill_sphere(const struct suite_scene *scene, json_t *values, struct moments *out,
-                        struct err *e)
+static bool fill_sphere(const struct suite_scene *scene, const struct suite_reference *ref,
+                        struct moments *out, struct err *e)
 {
     /* The number that tells the pieces apart has a digit to the base 6 for each way. */
     enum { MAX_DEPTH = 10 };
     struct truth_glass_sphere s = {.depth = scene->depth};
     struct truth_view view;
     json_t *v;
-    if (!sphere_values(values, &v, &s, e) || !truth_view_read(v, scene, &view, e))
+    if (!sphere_values(ref->values, &v, &s, e) || !truth_view_read(v, scene, &view, e))
         return false;
     double distance2 = 0;
     for (int k = 0; k < 3; k++) {

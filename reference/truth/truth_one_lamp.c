@@ -4,6 +4,7 @@
 
 #include <gsl/gsl_integration.h>
 #include <math.h>
+#include <string.h>
 
 /* Points per axis of the two rules whose difference is the error estimate. */
 enum { ORDER = 8, CHECK_ORDER = 2 * ORDER };
@@ -93,30 +94,20 @@ static bool mean_irradiance(const struct plane *p, const gsl_integration_glfixed
 
 static bool plane_render(const struct plane *p, struct moments *out, struct err *e)
 {
-    bool ok = false;
     gsl_integration_glfixed_table *rule = gsl_integration_glfixed_table_alloc(ORDER);
     gsl_integration_glfixed_table *check = gsl_integration_glfixed_table_alloc(CHECK_ORDER);
-    if (rule == NULL || check == NULL) {
-        err_set(e, "out of memory for a quadrature rule");
-        goto done;
-    }
+    bool ok = (rule != NULL && check != NULL) || err_set(e, "out of memory for a quadrature rule");
     double dx = (p->foot_x[1] - p->foot_x[0]) / out->width;
     double dz = (p->foot_z[1] - p->foot_z[0]) / out->height;
-    for (int row = 0; row < out->height; row++) {
-        for (int col = 0; col < out->width; col++) {
-            double x = p->foot_x[0] + dx * col, z = p->foot_z[0] + dz * row, mean;
-            if (!mean_irradiance(p, rule, check, (double[2]){x, x + dx}, (double[2]){z, z + dz},
-                                 &mean, e)) {
-                err_prefix(e, "pixel (%d,%d)", col, row);
-                goto done;
-            }
-            size_t pixel = (size_t)row * (size_t)out->width + (size_t)col;
-            for (size_t c = 0; c < 3; c++)
-                out->mean[3 * pixel + c] = p->albedo[c] / M_PI * p->strength[c] * mean;
-        }
+    for (int i = 0; ok && i < out->width * out->height; i++) {
+        int col = i % out->width, row = i / out->width;
+        double x = p->foot_x[0] + dx * col, z = p->foot_z[0] + dz * row, mean;
+        ok = mean_irradiance(p, rule, check, (double[2]){x, x + dx}, (double[2]){z, z + dz}, &mean,
+                             e) ||
+             err_prefix(e, "pixel (%d,%d)", col, row);
+        for (int c = 0; ok && c < 3; c++)
+            out->mean[3 * i + c] = p->albedo[c] / M_PI * p->strength[c] * mean;
     }
-    ok = true;
-done:
     gsl_integration_glfixed_table_free(rule);
     gsl_integration_glfixed_table_free(check);
     return ok;
@@ -208,47 +199,34 @@ static bool read_sphere(json_t *values, struct plane *p, struct err *e)
     return truth_check_triple("radiance", p->strength, HUGE_VAL, e);
 }
 
+static const struct {
+    const char *kind;
+    enum source source;
+    bool (*read)(json_t *, struct plane *, struct err *);
+} sources[] = {{"point_over_plane", SOURCE_POINT, read_point},
+               {"spot_over_plane", SOURCE_SPOT, read_spot},
+               {"rectangle_over_plane", SOURCE_RECTANGLE, read_rectangle},
+               {"sphere_over_plane", SOURCE_SPHERE, read_sphere}};
+
 /* The source itself is out of sight and the plane does not see itself, so that every depth from 1 on
  * gives the same image. */
-static bool fill_plane(struct plane *p, bool (*read)(json_t *, struct plane *, struct err *),
-                       const struct suite_scene *scene, json_t *values, struct moments *out,
-                       struct err *e)
+static bool fill_plane(const struct suite_scene *scene, const struct suite_reference *ref,
+                       struct moments *out, struct err *e)
 {
-    if (!read(values, p, e) || !truth_check_triple("albedo", p->albedo, 1, e) ||
+    int i = 0;
+    while (strcmp(sources[i].kind, ref->kind) != 0)
+        i++;
+    struct plane p = {.source = sources[i].source};
+    if (!sources[i].read(ref->values, &p, e) || !truth_check_triple("albedo", p.albedo, 1, e) ||
         !truth_check_depth(scene, e))
         return false;
-    if (p->foot_x[0] == p->foot_x[1] || p->foot_z[0] == p->foot_z[1])
+    if (p.foot_x[0] == p.foot_x[1] || p.foot_z[0] == p.foot_z[1])
         return err_set(e, "footprint has no area");
-    return plane_render(p, out, e);
+    return plane_render(&p, out, e);
 }
 
-static bool fill_point(const struct suite_scene *scene, json_t *values, struct moments *out,
-                       struct err *e)
-{
-    return fill_plane(&(struct plane){.source = SOURCE_POINT}, read_point, scene, values, out, e);
-}
-
-static bool fill_spot(const struct suite_scene *scene, json_t *values, struct moments *out,
-                      struct err *e)
-{
-    return fill_plane(&(struct plane){.source = SOURCE_SPOT}, read_spot, scene, values, out, e);
-}
-
-static bool fill_rectangle(const struct suite_scene *scene, json_t *values, struct moments *out,
-                           struct err *e)
-{
-    return fill_plane(&(struct plane){.source = SOURCE_RECTANGLE}, read_rectangle, scene, values,
-                      out, e);
-}
-
-static bool fill_sphere(const struct suite_scene *scene, json_t *values, struct moments *out,
-                        struct err *e)
-{
-    return fill_plane(&(struct plane){.source = SOURCE_SPHERE}, read_sphere, scene, values, out, e);
-}
-
-const struct truth_kind truth_one_lamp[] = {{"point_over_plane", fill_point, false},
-                                            {"spot_over_plane", fill_spot, false},
-                                            {"rectangle_over_plane", fill_rectangle, false},
-                                            {"sphere_over_plane", fill_sphere, false},
+const struct truth_kind truth_one_lamp[] = {{"point_over_plane", fill_plane, false},
+                                            {"spot_over_plane", fill_plane, false},
+                                            {"rectangle_over_plane", fill_plane, false},
+                                            {"sphere_over_plane", fill_plane, false},
                                             {0}};

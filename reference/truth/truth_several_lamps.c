@@ -98,14 +98,14 @@ static bool read_lamp(json_t *value, struct lamp *p, struct err *e)
     return truth_check_triple("strength", p->strength, HUGE_VAL, e);
 }
 
-static bool fill_lamps(const struct suite_scene *scene, json_t *values, struct moments *out,
-                       struct err *e)
+static bool fill_lamps(const struct suite_scene *scene, const struct suite_reference *ref,
+                       struct moments *out, struct err *e)
 {
     struct lamps l = {.num = 0};
     json_t *array, *value;
     json_error_t why;
     size_t i;
-    if (json_unpack_ex(values, &why, JSON_STRICT, "{s:[F,F,F], s:{s:[F,F], s:[F,F]}, s:o}",
+    if (json_unpack_ex(ref->values, &why, JSON_STRICT, "{s:[F,F,F], s:{s:[F,F], s:[F,F]}, s:o}",
                        "albedo", &l.albedo[0], &l.albedo[1], &l.albedo[2], "footprint", "x",
                        &l.foot_x[0], &l.foot_x[1], "z", &l.foot_z[0], &l.foot_z[1], "lamps",
                        &array) != 0)

@@ -40,14 +40,14 @@ static int floor_radiance(const void *form, const double eye[3], const double d[
     return is_floor;
 }
 
-static bool fill_floor(const struct suite_scene *scene, json_t *values, struct moments *out,
-                       struct err *e)
+static bool fill_floor(const struct suite_scene *scene, const struct suite_reference *ref,
+                       struct moments *out, struct err *e)
 {
     struct floor_scene s;
     struct truth_view view;
     json_error_t why;
     json_t *v;
-    if (json_unpack_ex(values, &why, JSON_STRICT,
+    if (json_unpack_ex(ref->values, &why, JSON_STRICT,
                        "{s:o, s:[F,F,F], s:[F,F,F], s:F, s:{s:F, s:[F,F], s:F}}", "view", &v, "sky",
                        &s.sky[0], &s.sky[1], &s.sky[2], "albedo", &s.albedo[0], &s.albedo[1],
                        &s.albedo[2], "floor_edge", &s.edge, "wall", "x", &s.wall_x, "z",
@@ -130,20 +130,20 @@ static int gradient_radiance(const void *form, const double eye[3], const double
     return hit;
 }
 
-static bool fill_gradient(const struct suite_scene *scene, json_t *values, struct moments *out,
-                          struct err *e)
+static bool fill_gradient(const struct suite_scene *scene, const struct suite_reference *ref,
+                          struct moments *out, struct err *e)
 {
     struct gradient_sphere s;
     struct truth_view view;
     json_error_t why;
     json_t *v, *mean, *gradient;
     double min_cos;
-    if (json_unpack_ex(values, &why, JSON_STRICT, "{s:o, s:[F,F,F], s:F, s:[F,F,F], s:o, s:o}",
+    if (json_unpack_ex(ref->values, &why, JSON_STRICT, "{s:o, s:[F,F,F], s:F, s:[F,F,F], s:o, s:o}",
                        "view", &v, "centre", &s.centre[0], &s.centre[1], &s.centre[2], "radius",
                        &s.radius, "albedo", &s.albedo[0], &s.albedo[1], &s.albedo[2], "mean", &mean,
                        "gradient", &gradient) != 0)
         return err_set(e, "%s", why.text);
-    if (!truth_view_read(v, scene, &view, e) || !truth_gradient_read(values, &s.sky, e) ||
+    if (!truth_view_read(v, scene, &view, e) || !truth_gradient_read(ref->values, &s.sky, e) ||
         !truth_check_triple("albedo", s.albedo, 1, e) ||
         !truth_view_filled(&view, s.centre, s.radius, &min_cos, e))
         return false;

@@ -28,16 +28,16 @@ static int window_radiance(const void *form, const double eye[3], const double d
     return sky > 0;
 }
 
-static bool fill_window(const struct suite_scene *scene, json_t *values, struct moments *out,
-                        struct err *e)
+static bool fill_window(const struct suite_scene *scene, const struct suite_reference *ref,
+                        struct moments *out, struct err *e)
 {
     struct window w;
     struct truth_view view;
     json_error_t why;
     json_t *v;
-    if (json_unpack_ex(values, &why, JSON_STRICT, "{s:o, s:F, s:[F,F,F], s:[F,F,F]}", "view", &v,
-                       "ior", &w.n, "sky", &w.sky[0], &w.sky[1], &w.sky[2], "floor", &w.floor[0],
-                       &w.floor[1], &w.floor[2]) != 0)
+    if (json_unpack_ex(ref->values, &why, JSON_STRICT, "{s:o, s:F, s:[F,F,F], s:[F,F,F]}", "view",
+                       &v, "ior", &w.n, "sky", &w.sky[0], &w.sky[1], &w.sky[2], "floor",
+                       &w.floor[0], &w.floor[1], &w.floor[2]) != 0)
         return err_set(e, "%s", why.text);
     if (!truth_view_read(v, scene, &view, e) || !truth_check_triple("sky", w.sky, HUGE_VAL, e) ||
         !truth_check_triple("floor", w.floor, HUGE_VAL, e))

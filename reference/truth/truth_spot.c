@@ -1,6 +1,7 @@
 #include "truth_spot.h"
 
 #include <gsl/gsl_integration.h>
+#include <gsl/gsl_sort.h>
 #include <math.h>
 #include <stddef.h>
 
@@ -119,12 +120,7 @@ static int find_cuts(const struct truth_spot *s, const double x[2], const double
         if (candidate[i] > z[0] && candidate[i] < z[1])
             cut[n++] = candidate[i];
     cut[n++] = z[1];
-    for (int i = 1; i < n; i++)
-        for (int j = i; j > 0 && cut[j - 1] > cut[j]; j--) {
-            double t = cut[j];
-            cut[j] = cut[j - 1];
-            cut[j - 1] = t;
-        }
+    gsl_sort(cut, 1, (size_t)n);
     return n;
 }
 

@@ -72,12 +72,13 @@ static double clamp01(double x)
     return fmin(fmax(x, 0), 1);
 }
 
-static bool fill_pyramid(const struct suite_scene *scene, json_t *values, struct moments *out,
-                         struct err *e)
+static bool fill_pyramid(const struct suite_scene *scene, const struct suite_reference *ref,
+                         struct moments *out, struct err *e)
 {
     struct truth_pyramid p;
     double irradiance[3], albedo[3], centre[2], facet[4];
-    if (!read_pyramid(values, &p, irradiance, albedo, centre, e) || !truth_check_depth(scene, e))
+    if (!read_pyramid(ref->values, &p, irradiance, albedo, centre, e) ||
+        !truth_check_depth(scene, e))
         return false;
     truth_pyramid_cosines(&p, facet);
     for (int row = 0; row < out->height; row++)

@@ -148,15 +148,15 @@ static bool read_board(json_t *value, struct board *b, struct err *e)
            read_wrap(wrap[0], &b->wrap[0], e) && read_wrap(wrap[1], &b->wrap[1], e);
 }
 
-static bool fill_pictures(const struct suite_scene *scene, json_t *values, struct moments *out,
-                          struct err *e)
+static bool fill_pictures(const struct suite_scene *scene, const struct suite_reference *ref,
+                          struct moments *out, struct err *e)
 {
     json_error_t why;
     json_t *rows, *boards, *value;
     size_t i;
     struct picture *t = calloc(1, sizeof *t);
     bool ok = t != NULL || err_set(e, "out of memory");
-    if (ok && json_unpack_ex(values, &why, JSON_STRICT, "{s:i, s:o, s:o}", "width", &t->width,
+    if (ok && json_unpack_ex(ref->values, &why, JSON_STRICT, "{s:i, s:o, s:o}", "width", &t->width,
                              "rows", &rows, "boards", &boards) != 0)
         ok = err_set(e, "%s", why.text);
     ok = ok && truth_check_depth(scene, e) && read_picture(rows, t, e);
