@@ -262,23 +262,11 @@ bool sandbox_pack(const char *path, const char *tar, size_t most, bool *too_larg
     }
     char limit[64];
     snprintf(limit, sizeof limit, "--fsize=%zu", most);
-    const char *const argv[] = {"prlimit",
-                                limit,
-                                "--",
-                                "tar",
-                                "-C",
-                                parent,
-                                "--mode=u+rwX",
-                                "--sort=name",
-                                "--owner=0",
-                                "--group=0",
-                                "--numeric-owner",
-                                "-cSf",
-                                tar,
-                                "--",
-                                name,
-                                NULL};
-    const struct process p = {.argv = argv, .timeout_s = 120};
+    const struct process p = {
+        .argv = (const char *const[]){"prlimit", limit, "--", "tar", "-C", parent, "--mode=u+rwX",
+                                      "--sort=name", "--owner=0", "--group=0", "--numeric-owner",
+                                      "-cSf", tar, "--", name, NULL},
+        .timeout_s = 120};
     struct process_usage usage = {0};
     struct err why;
     if (process_run(&p, &usage, &why))

@@ -62,26 +62,16 @@ static bool show_files(struct bare *b, struct err *e)
 {
     const char *hidden[sizeof b->s->hidden / sizeof *b->s->hidden + 1] = {NULL};
     const char *cache = b->job->cache;
-    const char *const read[] = {"/usr",
-                                "/lib",
-                                "/lib32",
-                                "/lib64",
-                                "/bin",
-                                "/sbin",
-                                "/etc",
-                                "/proc",
-                                "/sys/devices/system",
-                                b->box.s,
-                                b->job->scene != NULL ? b->job->scene : cache,
-                                cache,
-                                NULL};
-    const char *const write[] = {
-        b->box.s,    b->temp.s,     "/dev/null",    "/dev/zero",
-        "/dev/full", "/dev/random", "/dev/urandom", b->job->fill_cache ? cache : NULL,
-        NULL};
     for (int i = 0; i < b->s->num_hidden; i++)
         hidden[i] = b->s->hidden[i];
-    return confine_files(read, write, hidden, &b->c.files, e);
+    return confine_files((const char *const[]){"/usr", "/lib", "/lib32", "/lib64", "/bin", "/sbin",
+                                               "/etc", "/proc", "/sys/devices/system", b->box.s,
+                                               b->job->scene != NULL ? b->job->scene : cache, cache,
+                                               NULL},
+                         (const char *const[]){b->box.s, b->temp.s, "/dev/null", "/dev/zero",
+                                               "/dev/full", "/dev/random", "/dev/urandom",
+                                               b->job->fill_cache ? cache : NULL, NULL},
+                         hidden, &b->c.files, e);
 }
 
 /* A shell of the program's user in the box, for what would follow links of the program's if root did it. fsize: of a file that it writes;

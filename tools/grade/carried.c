@@ -66,12 +66,8 @@ int carried_part_of(const struct rubric *r, const struct bug *b)
 
 /* What is being carried on. */
 struct carry {
-    const struct rubric *r;
-    const struct answer_key *a;
-    const struct rubric_bugs *b;
-    struct submitted_images *h;
+    const struct grading *g;
     int with, bug[2], paid[2], num; /* bugs, and the parts in which they are paid */
-    double alpha;
 };
 
 static bool loses(const struct rubric *r, const struct result *result, int part)
@@ -85,8 +81,8 @@ static bool loses(const struct rubric *r, const struct result *result, int part)
 static bool shows(const struct carry *w, int bug, const struct rubric_check *c)
 {
     for (int k = 0; k < c->num_images; k++) {
-        int view = w->b->view[w->with][c->images[k]];
-        if (view >= 0 && w->b->catalogue.view[view].effect[bug] != NULL)
+        int view = w->g->bugs->view[w->with][c->images[k]];
+        if (view >= 0 && w->g->bugs->catalogue.view[view].effect[bug] != NULL)
             return true;
     }
     return false;
@@ -96,12 +92,12 @@ static bool shows(const struct carry *w, int bug, const struct rubric_check *c)
 static int earliest(const struct carry *w, int bug, const struct result *result)
 {
     int first = -1;
-    for (int i = 0; i < w->r->num_checks; i++) {
+    for (int i = 0; i < w->g->r->num_checks; i++) {
         if (result[i].share == 1)
             continue;
-        if (shows(w, bug, &w->r->check[i]))
-            return w->r->check[i].part;
-        first = first < 0 ? w->r->check[i].part : first;
+        if (shows(w, bug, &w->g->r->check[i]))
+            return w->g->r->check[i].part;
+        first = first < 0 ? w->g->r->check[i].part : first;
     }
     return first;
 }
@@ -116,8 +112,9 @@ static void find_payer(struct carry *w, const struct diagnosis *found, int membe
         const struct candidate *c = &found->candidate[k];
         if (member == 0 ? c->second != first->second : c->bug != first->bug)
             continue;
-        int own = carried_part_of(w->r, &w->b->catalogue.bug[member == 0 ? c->bug : c->second]);
-        if (own >= 0 && loses(w->r, result, own) && (paid < 0 || own < paid))
+        int own =
+            carried_part_of(w->g->r, &w->g->bugs->catalogue.bug[member == 0 ? c->bug : c->second]);
+        if (own >= 0 && loses(w->g->r, result, own) && (paid < 0 || own < paid))
             paid = own;
     }
     w->bug[member] = member == 0 ? first->bug : first->second;
@@ -143,9 +140,9 @@ static bool add_image(const struct carry *w, int image, int sign, int bugs, stru
     struct observation *seen = malloc(sizeof *seen);
     struct effect *room = malloc(sizeof *room);
     bool ok = (seen != NULL && room != NULL) || err_set(e, "out of memory");
-    ok = ok && rubric_bugs_observe(w->b, w->r, w->a, w->h, w->with, image, seen, e);
+    ok = ok && rubric_bugs_observe(w->g, w->with, image, seen, e);
     if (ok) {
-        double clip = rubric_sight_clip(w->r);
+        double clip = rubric_sight_clip(w->g->r);
         int first = bugs & 1 ? w->bug[0] : w->bug[1], second = bugs == 3 ? w->bug[1] : -1;
         const struct signature *s = &seen->seen, *c = &seen->view->correct;
         const struct effect *effect =
@@ -269,19 +266,19 @@ static double share_off(const struct cells *s)
 static bool judge_rates(const struct carry *w, const struct rubric_check *c, struct result *out)
 {
     int image = c->images[0];
-    const struct rubric_image *p = &w->r->image[image];
+    const struct rubric_image *p = &w->g->r->image[image];
     struct stopping by[NUM_STOPPING_KINDS];
     struct rate_image rates;
     struct err why; /* which has been said */
-    if (w->h->made[image].rates[0] == '\0' ||
-        !rate_image_read(w->h->made[image].rates, p->width, p->height, p->spp, c->batch,
-                         answer_key_counts(w->a, w->with, image)->n, &rates, &why) ||
-        !stopping_rule_samples(p, &w->h->image[image], answer_key_image(w->a, w->with, image), by,
-                               &why))
+    if (w->g->h->made[image].rates[0] == '\0' ||
+        !rate_image_read(w->g->h->made[image].rates, p->width, p->height, p->spp, c->batch,
+                         answer_key_counts(w->g->a, w->with, image)->n, &rates, &why) ||
+        !stopping_rule_samples(p, &w->g->h->image[image], answer_key_image(w->g->a, w->with, image),
+                               by, &why))
         return true;
     double least = by[STOPS_RIGHTLY].least, most = by[STOPS_RIGHTLY].most,
            odd = rates.odd / fmax(1, rates.pixels),
-           half = stats_normal_quantile(w->alpha / 2) * rates.sd;
+           half = stats_normal_quantile(w->g->alpha / 2) * rates.sd;
     const struct interval count = {rates.mean / sqrt(least * most) - 1,
                                    rates.mean / most - 1 - half, rates.mean / least - 1 + half,
                                    rates.sd},
@@ -301,7 +298,7 @@ static bool judge(const struct carry *w, const struct rubric_check *c, int bugs,
                  c->kind == CHECK_EXACT || c->kind == CHECK_RATES || c->kind == CHECK_GROWTH;
     const int images = c->kind == CHECK_GROWTH ? 1 : c->num_images;
     for (int k = 0; k < images; k++)
-        *is_judged = *is_judged && rubric_bugs_can_observe(w->b, w->h, w->with, c->images[k]);
+        *is_judged = *is_judged && rubric_bugs_can_observe(w->g, w->with, c->images[k]);
     if (ok && *is_judged && c->kind == CHECK_RATES) {
         free(cells);
         return judge_rates(w, c, out);
@@ -315,11 +312,11 @@ static bool judge(const struct carry *w, const struct rubric_check *c, int bugs,
         out->chance = 0;
         snprintf(out->seen, sizeof out->seen, "%.2f %% of the cells differ", 100 * off);
     } else if (ok && *is_judged) {
-        ok = measure(cells, w->alpha, &out->agreement, e);
+        ok = measure(cells, w->g->alpha, &out->agreement, e);
         if (ok)
             score(c, out);
         if (ok && c->kind == CHECK_GROWTH && out->share > 0)
-            grade_checks_growth(w->r, c, w->h, out);
+            grade_checks_growth(w->g, c, out);
     }
     free(cells);
     return ok;
@@ -332,13 +329,13 @@ static void tell(const struct carry *w, int bugs, struct result *out)
     for (int k = 0; k < w->num; k++)
         if (bugs >> k & 1)
             text_append(out->carried, sizeof out->carried, "%s %s (Part %s)",
-                        k > 0 && bugs == 3 ? ";" : "", w->b->catalogue.bug[w->bug[k]].what,
-                        w->r->part[w->paid[k]].number);
+                        k > 0 && bugs == 3 ? ";" : "", w->g->bugs->catalogue.bug[w->bug[k]].what,
+                        w->g->r->part[w->paid[k]].number);
 }
 
 static bool carry_check(const struct carry *w, int check, struct result *result, struct err *e)
 {
-    const struct rubric_check *c = &w->r->check[check];
+    const struct rubric_check *c = &w->g->r->check[check];
     int bugs = 0;
     bool is_judged = false, is_shown = false;
     for (int k = 0; k < w->num; k++)
@@ -363,19 +360,17 @@ static bool carry_check(const struct carry *w, int check, struct result *result,
     return true;
 }
 
-bool carried_by_name(const struct rubric *r, const struct answer_key *a,
-                     const struct rubric_bugs *b, struct submitted_images *h, int with,
-                     const struct diagnosis *found, double alpha, struct result *result,
-                     bool paid[RUBRIC_PARTS], struct err *e)
+bool carried_by_name(const struct grading *g, int with, const struct diagnosis *found,
+                     struct result *result, bool paid[RUBRIC_PARTS], struct err *e)
 {
-    struct carry w = {.r = r, .a = a, .b = b, .h = h, .with = with, .alpha = alpha};
+    struct carry w = {.g = g, .with = with};
     find_payer(&w, found, 0, result);
     if (found->candidate[0].second >= 0)
         find_payer(&w, found, 1, result);
     for (int k = 0; k < w.num; k++)
         paid[w.paid[k]] = true;
     bool ok = true;
-    for (int i = 0; ok && i < r->num_checks; i++)
+    for (int i = 0; ok && i < g->r->num_checks; i++)
         ok = carry_check(&w, i, &result[i], e);
     return ok;
 }

@@ -2,6 +2,7 @@
 
 #include "rate_image.h"
 
+#include <gsl/gsl_statistics_double.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -74,14 +75,10 @@ static double correlation(const double *u, const double *v, int columns, int row
 }
 
 /* Standard deviation over mean. */
-static double spread_of(const double *tile, int num)
+static double spread_of(const double *tile, size_t num)
 {
-    double sum = 0, squares = 0;
-    for (int i = 0; i < num; i++) {
-        sum += tile[i];
-        squares += tile[i] * tile[i];
-    }
-    return sum > 0 ? sqrt(fmax(0, num * squares / (sum * sum) - 1)) : INFINITY;
+    double mean = gsl_stats_mean(tile, 1, num);
+    return mean > 0 ? gsl_stats_sd_with_fixed_mean(tile, 1, num, mean) / mean : INFINITY;
 }
 
 /* Does it show what m shows? Of what is nearly of one radiance nothing can be seen but that it is: even_too says whether that is enough. */
@@ -89,29 +86,30 @@ static bool is_like(const struct submitted_image *s, const struct moments *m, bo
                     bool *is, struct err *e)
 {
     static const double least = 0.5, even = 0.15, noisy = 0.3;
-    int columns = s->width / RUBRIC_TILE, rows = s->height / RUBRIC_TILE, num = columns * rows;
+    int columns = s->width / RUBRIC_TILE, rows = s->height / RUBRIC_TILE;
     double *theirs = tiles_of(s->mean, s->width, s->height, s->clip),
            *ours = tiles_of(m->mean, s->width, s->height, s->clip);
     bool ok = (theirs != NULL && ours != NULL) || err_set(e, "out of memory");
     *is = ok && (correlation(theirs, ours, columns, rows) >= least ||
-                 (even_too && spread_of(ours, num) < even && spread_of(theirs, num) < noisy));
+                 (even_too && spread_of(ours, (size_t)(columns * rows)) < even &&
+                  spread_of(theirs, (size_t)(columns * rows)) < noisy));
     free(theirs);
     free(ours);
     return ok;
 }
 
 /* Only that it draws the scene matters for its times. */
-static bool carry_growth(const struct rubric *r, const struct answer_key *a, int set,
-                         const struct submitted_images *h, const struct rubric_check *c,
+static bool carry_growth(const struct grading *g, int set, const struct rubric_check *c,
                          struct result *out, struct err *e)
 {
     struct result other = *out;
     bool is;
-    if (!is_like(&h->image[c->images[0]], answer_key_image(a, set, c->images[0]), false, &is, e))
+    if (!is_like(&g->h->image[c->images[0]], answer_key_image(g->a, set, c->images[0]), false, &is,
+                 e))
         return false;
     if (!is)
         return true;
-    grade_checks_growth(r, c, h, &other);
+    grade_checks_growth(g, c, &other);
     if (other.share <= out->share)
         return true;
     *out = other;
@@ -161,13 +159,13 @@ static double ratio_of_bounces(double right, double s, int bounces)
     return sum[1];
 }
 
-static bool carry_ratio(const struct rubric *r, const struct answer_key *a, int set,
-                        const struct submitted_images *h, const struct rubric_check *c, bool drawn,
+static bool carry_ratio(const struct grading *g, int set, const struct rubric_check *c, bool drawn,
                         struct result *out, struct err *e)
 {
-    const struct submitted_image *p = &h->image[c->images[0]], *b = &h->image[c->after];
-    const struct moments *rp = answer_key_image(a, set, c->images[0]),
-                         *rb = answer_key_image(a, set, c->after);
+    const struct rubric *r = g->r;
+    const struct submitted_image *p = &g->h->image[c->images[0]], *b = &g->h->image[c->after];
+    const struct moments *rp = answer_key_image(g->a, set, c->images[0]),
+                         *rb = answer_key_image(g->a, set, c->after);
     if (b->mean == NULL || p->width != b->width || p->height != b->height ||
         strcmp(p->sha256, b->sha256) == 0)
         return true;
@@ -256,17 +254,16 @@ static bool is_drawn(const struct rubric *r, const struct rubric_check *c,
 }
 
 /* How many samples a wrong image takes differs a little from a right one. */
-static bool carry_rates(const struct rubric *r, const struct answer_key *a, int set,
-                        const struct submitted_images *h, const struct rubric_check *c,
+static bool carry_rates(const struct grading *g, int set, const struct rubric_check *c,
                         struct result *out, struct err *e)
 {
-    const struct rubric_image *p = &r->image[c->images[0]];
-    const struct moments *ours = answer_key_counts(a, set, c->images[0]);
+    const struct rubric_image *p = &g->r->image[c->images[0]];
+    const struct moments *ours = answer_key_counts(g->a, set, c->images[0]);
     struct rate_image rates;
     struct err why;
-    if (h->made[c->images[0]].rates[0] == '\0')
+    if (g->h->made[c->images[0]].rates[0] == '\0')
         return true;
-    if (!rate_image_read(h->made[c->images[0]].rates, p->width, p->height, p->spp, c->batch,
+    if (!rate_image_read(g->h->made[c->images[0]].rates, p->width, p->height, p->spp, c->batch,
                          ours->n, &rates, &why))
         return !err_is_of_memory(&why) || err_set(e, "%s", why.msg);
     double v = rates.more > -1 ? log1p(rates.more) : -INFINITY,
@@ -300,37 +297,36 @@ static int quieter(const struct rubric *r, const struct submitted_images *h, int
 }
 
 /* Noise is measured against the program's own image, if that is not what it should be. */
-static bool carry_noise(const struct rubric *r, const struct answer_key *a,
-                        struct submitted_images *h, const struct rubric_check *c, double alpha,
-                        struct result *out, struct err *e)
+static bool carry_noise(const struct grading *g, const struct rubric_check *c, struct result *out,
+                        struct err *e)
 {
-    struct submitted_image *p = &h->image[c->images[0]], *q = &h->image[c->images[1]], own;
-    int other = quieter(r, h, c->images[0]);
+    struct submitted_image *p = &g->h->image[c->images[0]], *q = &g->h->image[c->images[1]], own;
+    int other = quieter(g->r, g->h, c->images[0]);
     size_t pixels = (size_t)p->width * (size_t)p->height;
     struct interval i;
     struct err why;
     if (other < 0 || strcmp(p->sha256, q->sha256) == 0)
         return true;
-    submitted_image_expect(&h->image[other], &a->of[0][other].noise, r->image[other].spp);
+    submitted_image_expect(&g->h->image[other], &g->a->of[0][other].noise, g->r->image[other].spp);
     unsigned char *use = malloc(pixels);
-    if (use == NULL || !submitted_image_copy(&h->image[other], &own, e)) {
+    if (use == NULL || !submitted_image_copy(&g->h->image[other], &own, e)) {
         free(use);
         return err_set(e, "out of memory");
     }
     own.known = true;
     for (size_t k = 0; k < pixels; k++)
-        use[k] = !rubric_masks(r, p->width, p->height, k);
+        use[k] = !rubric_masks(g->r, p->width, p->height, k);
     submitted_image_unclipped(p, use);
     submitted_image_unclipped(q, use);
     submitted_image_unclipped(&own, use);
     bool related = difference_related(q, &own, use),
-         known = related && difference_noise(p, &own, q, &own, use, alpha, &i, &why);
+         known = related && difference_noise(p, &own, q, &own, use, g->alpha, &i, &why);
     if (known && score_share(&c->log_ratio, &i) > out->share) {
         out->share = score_share(&c->log_ratio, &i);
         out->chance = score_chance(&c->log_ratio, &i);
         out->more = 0;
         snprintf(out->carried, sizeof out->carried, "against the program's own image '%s'",
-                 r->image[other].name);
+                 g->r->image[other].name);
         snprintf(out->seen, sizeof out->seen, "%.3g times as much (%.3g to %.3g)", exp(i.value),
                  exp(i.lo), exp(i.hi));
     }
@@ -339,26 +335,26 @@ static bool carry_noise(const struct rubric *r, const struct answer_key *a,
     return known || !related || !err_is_of_memory(&why) || err_set(e, "%s", why.msg);
 }
 
-bool carried_by_ratio(const struct rubric *r, const struct answer_key *a, int set,
-                      struct submitted_images *h, double alpha, const double *share,
-                      const bool *paid, struct result *result, struct err *e)
+bool carried_by_ratio(const struct grading *g, int set, const double *share, const bool *paid,
+                      struct result *result, struct err *e)
 {
+    const struct rubric *r = g->r;
     bool ok = true;
     for (int i = 0; ok && i < r->num_checks; i++) {
         const struct rubric_check *c = &r->check[i];
         const struct rubric_image *p = &r->image[c->images[0]];
-        if (result[i].share == 1 || paid[c->part] || !result[i].judged || !is_there(h, c))
+        if (result[i].share == 1 || paid[c->part] || !result[i].judged || !is_there(g->h, c))
             continue;
         /* Deviations that are accepted are not recognised where a mistake is in all images that show them. */
         if (c->after >= 0 && was_lost(r, c, c->after, p, share))
             for (int k = 0; ok && k < r->num_sets; k++)
-                ok = carry_ratio(r, a, k, h, c, is_drawn(r, c, result), &result[i], e);
+                ok = carry_ratio(g, k, c, is_drawn(r, c, result), &result[i], e);
         else if (c->kind == CHECK_RATES && was_lost(r, c, -1, p, share))
-            ok = carry_rates(r, a, set, h, c, &result[i], e);
+            ok = carry_rates(g, set, c, &result[i], e);
         else if (c->kind == CHECK_GROWTH)
-            ok = carry_growth(r, a, set, h, c, &result[i], e);
+            ok = carry_growth(g, set, c, &result[i], e);
         else if (c->kind == CHECK_NOISE)
-            ok = carry_noise(r, a, h, c, alpha, &result[i], e);
+            ok = carry_noise(g, c, &result[i], e);
     }
     return ok;
 }

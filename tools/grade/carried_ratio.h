@@ -13,8 +13,7 @@
  * see, or no other image of the scene is right), carries nothing on.
  * `rates` of a scene of which an earlier part lost points: the logarithm of the number of samples over ours against that margin.
  * `noise`: against another image of the program's own with more samples, instead of the right one. False: out of memory. */
-bool carried_by_ratio(const struct rubric *r, const struct answer_key *a, int set,
-                      struct submitted_images *h, double alpha, const double *share,
-                      const bool *paid, struct result *result, struct err *e);
+bool carried_by_ratio(const struct grading *g, int set, const double *share, const bool *paid,
+                      struct result *result, struct err *e);
 
 #endif

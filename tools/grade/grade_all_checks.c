@@ -11,17 +11,16 @@ static void free_results(struct result *out, int num)
 }
 
 /* On failure there is nothing to free. */
-static bool grade_with(const struct rubric *r, const struct answer_key *a, int set,
-                       struct submitted_images *h, double alpha, struct result *out, double *points,
+static bool grade_with(const struct grading *g, int set, struct result *out, double *points,
                        struct err *e)
 {
     *points = 0;
-    for (int i = 0; i < r->num_checks; i++) {
-        if (!grade_checks_run(r, &r->check[i], a, set, h, alpha, &out[i], e)) {
+    for (int i = 0; i < g->r->num_checks; i++) {
+        if (!grade_checks_run(g, &g->r->check[i], set, &out[i], e)) {
             free_results(out, i);
             return false;
         }
-        *points += r->check[i].points * out[i].share;
+        *points += g->r->check[i].points * out[i].share;
     }
     return true;
 }
@@ -41,37 +40,35 @@ static bool explains(const struct rubric *r, const double *plain, const struct r
     return false;
 }
 
-bool grade_all_checks(const struct rubric *r, const struct answer_key *a,
-                      struct submitted_images *h, double alpha, struct result *out, int *set,
-                      struct err *e)
+bool grade_all_checks(const struct grading *g, struct result *out, int *set, struct err *e)
 {
     static const double worth_telling = 0.01; /* of all points */
-    double plain[RUBRIC_CHECKS], best, points, total = rubric_points(r);
+    double plain[RUBRIC_CHECKS], best, points, total = rubric_points(g->r);
     struct result *tried = calloc(RUBRIC_CHECKS, sizeof *tried);
     *set = 0;
     if (tried == NULL)
         return err_set(e, "out of memory");
-    bool ok = grade_with(r, a, 0, h, alpha, out, &best, e);
-    for (int i = 0; ok && i < r->num_checks; i++)
+    bool ok = grade_with(g, 0, out, &best, e);
+    for (int i = 0; ok && i < g->r->num_checks; i++)
         plain[i] = out[i].share;
     if (ok && best < total)
         best += worth_telling * total;
-    for (int k = 1; ok && k < r->num_sets && best < total; k++) {
-        ok = grade_with(r, a, k, h, alpha, tried, &points, e);
+    for (int k = 1; ok && k < g->r->num_sets && best < total; k++) {
+        ok = grade_with(g, k, tried, &points, e);
         if (!ok) {
-            free_results(out, r->num_checks);
-        } else if (points > best && explains(r, plain, tried)) {
-            free_results(out, r->num_checks);
-            memcpy(out, tried, (size_t)r->num_checks * sizeof *out);
+            free_results(out, g->r->num_checks);
+        } else if (points > best && explains(g->r, plain, tried)) {
+            free_results(out, g->r->num_checks);
+            memcpy(out, tried, (size_t)g->r->num_checks * sizeof *out);
             best = points;
             *set = k;
         } else {
-            free_results(tried, r->num_checks);
+            free_results(tried, g->r->num_checks);
         }
     }
-    for (int i = 0; ok && *set > 0 && i < r->num_checks; i++)
+    for (int i = 0; ok && *set > 0 && i < g->r->num_checks; i++)
         if (out[i].share > plain[i])
-            snprintf(out[i].accepted, sizeof out[i].accepted, "%s", r->set[*set].name);
+            snprintf(out[i].accepted, sizeof out[i].accepted, "%s", g->r->set[*set].name);
     free(tried);
     return ok;
 }

@@ -41,39 +41,36 @@ double score_chance(const struct margin *m, const struct interval *i)
 
 /* One check being made. */
 struct work {
-    const struct rubric *r;
+    const struct grading *g;
     const struct rubric_check *check;
-    const struct answer_key *answers;
     int set;
-    struct submitted_images *h;
-    double alpha;
 };
 
 static const struct rubric_image *image_of(const struct work *w, int k)
 {
-    return &w->r->image[w->check->images[k]];
+    return &w->g->r->image[w->check->images[k]];
 }
 
 static const struct submitted_image *student(const struct work *w, int k)
 {
-    return &w->h->image[w->check->images[k]];
+    return &w->g->h->image[w->check->images[k]];
 }
 
 /* NULL: the rubric gives none. */
 static const struct moments *reference(const struct work *w, int k)
 {
-    return answer_key_image(w->answers, w->set, w->check->images[k]);
+    return answer_key_image(w->g->a, w->set, w->check->images[k]);
 }
 
 static const struct moments *expected_noise(const struct work *w, int k)
 {
-    const struct moments *own = &w->answers->of[w->set][w->check->images[k]].m;
-    return own->width > 0 ? own : &w->answers->of[0][w->check->images[k]].noise;
+    const struct moments *own = &w->g->a->of[w->set][w->check->images[k]].m;
+    return own->width > 0 ? own : &w->g->a->of[0][w->check->images[k]].noise;
 }
 
 static bool is_masked(const struct work *w, const struct submitted_image *s, size_t p)
 {
-    return rubric_masks(w->r, s->width, s->height, p);
+    return rubric_masks(w->g->r, s->width, s->height, p);
 }
 
 /* Times the samples, where it is not known how many it takes. */
@@ -82,9 +79,9 @@ static const double few = 4;
 /* More samples can be had of all its images. */
 static bool can_buy(const struct work *w)
 {
-    bool all = w->h->can_buy;
+    bool all = w->g->h->can_buy;
     for (int k = 0; k < w->check->num_images; k++)
-        all = all && !w->h->fixed[w->check->images[k]];
+        all = all && !w->g->h->fixed[w->check->images[k]];
     return all;
 }
 
@@ -123,9 +120,9 @@ static void model_noise(const struct work *w, const unsigned char *use, const do
         any = any || student(w, k)->num_runs > 1;
     for (int k = 0; k < w->check->num_images; k++)
         if (student(w, k)->num_runs <= 1)
-            submitted_image_model(&w->h->image[w->check->images[k]], any ? kappa[k] : 0);
+            submitted_image_model(&w->g->h->image[w->check->images[k]], any ? kappa[k] : 0);
     for (int k = 0; any && k < w->check->num_images; k++)
-        submitted_image_scale_skewness(&w->h->image[w->check->images[k]], use);
+        submitted_image_scale_skewness(&w->g->h->image[w->check->images[k]], use);
 }
 
 /* Pixels that can be compared. What is noisier than our renders reaches the clipping point from further away; where
@@ -265,7 +262,7 @@ static bool compare(const struct work *w, const struct submitted_image *a,
 {
     struct err why;
     bool blind = out->more > 0;
-    const bool measured = difference_measure(a, b, use, w->alpha, &out->agreement, &why);
+    const bool measured = difference_measure(a, b, use, w->g->alpha, &out->agreement, &why);
     if (measured) {
         score_agreement(w, out);
         blind =
@@ -318,7 +315,7 @@ static bool compare_stopped(const struct work *w, struct submitted_image *right,
 static bool check_equal(const struct work *w, struct result *out, struct err *e)
 {
     const struct rubric_image *p = image_of(w, 0);
-    const struct moments *plain = &w->answers->of[0][w->check->images[0]].m;
+    const struct moments *plain = &w->g->a->of[0][w->check->images[0]].m;
     const struct submitted_image *s = student(w, 0), *first = s->num_runs > 0 ? s->run : s;
     unsigned char *use = usable(w, out, e);
     struct submitted_image b;
@@ -510,7 +507,7 @@ static bool check_noise(const struct work *w, struct result *out, struct err *e)
     if (!difference_related(q, &rq, use)) {
         snprintf(out->seen, sizeof out->seen, "%s is no image of its scene", image_of(w, 1)->name);
         out->more = 0;
-    } else if (difference_noise(p, &rp, q, &rq, use, w->alpha, &i, &why)) {
+    } else if (difference_noise(p, &rp, q, &rq, use, w->g->alpha, &i, &why)) {
         snprintf(out->seen, sizeof out->seen, "%.3g times as much (%.3g to %.3g)", exp(i.value),
                  exp(i.lo), exp(i.hi));
         out->share = 1;
@@ -546,8 +543,8 @@ static bool widen_count(const struct work *w, double ours, struct interval *coun
 static bool check_rates(const struct work *w, struct result *out, struct err *e)
 {
     const struct rubric_check *c = w->check;
-    const struct made *made = &w->h->made[c->images[0]];
-    const struct moments *ours = answer_key_counts(w->answers, w->set, c->images[0]);
+    const struct made *made = &w->g->h->made[c->images[0]];
+    const struct moments *ours = answer_key_counts(w->g->a, w->set, c->images[0]);
     struct rate_image rates;
     struct err why;
     snprintf(
@@ -565,7 +562,7 @@ static bool check_rates(const struct work *w, struct result *out, struct err *e)
         snprintf(out->seen, sizeof out->seen, "the rate image: %.370s", why.msg);
         return true;
     }
-    double half = stats_normal_quantile(w->alpha / 2) * rates.sd;
+    double half = stats_normal_quantile(w->g->alpha / 2) * rates.sd;
     struct interval count = {rates.more, rates.more - half, rates.more + half, rates.sd};
     if (score_share(&c->count, &count) < 1 && rubric_is_adaptive(image_of(w, 0)) &&
         !widen_count(w, rates.mean / (1 + rates.more), &count, out, e))
@@ -589,16 +586,16 @@ static double timing_error(const struct made *m)
     return 0.01 + 0.05 * m->cpu_s;
 }
 
-void grade_checks_growth(const struct rubric *r, const struct rubric_check *c,
-                         const struct submitted_images *h, struct result *out)
+void grade_checks_growth(const struct grading *g, const struct rubric_check *c, struct result *out)
 {
     const struct made *made[4];
     for (int k = 0; k < 4; k++)
-        made[k] = &h->made[c->images[k]];
+        made[k] = &g->h->made[c->images[k]];
     out->share = out->chance = out->more = 0;
     snprintf(out->expected, sizeof out->expected,
              "the samples of %s take at most %.3g times as long as those of %s",
-             r->image[c->images[0]].name, exp(c->log_ratio.full), r->image[c->images[2]].name);
+             g->r->image[c->images[0]].name, exp(c->log_ratio.full),
+             g->r->image[c->images[2]].name);
     if (made[0]->cpu_s <= 0) {
         snprintf(out->seen, sizeof out->seen, "no program ran that could be timed");
         return;
@@ -619,8 +616,8 @@ static bool check_growth(const struct work *w, struct result *out, struct err *e
     if (!check_equal(w, out, e))
         return false;
     bool is_wrong = out->share < 0.5; /* black is off by less than 100 % of it */
-    grade_checks_growth(w->r, w->check, w->h, out);
-    if (is_wrong && w->h->made[w->check->images[0]].cpu_s > 0) {
+    grade_checks_growth(w->g, w->check, out);
+    if (is_wrong && w->g->h->made[w->check->images[0]].cpu_s > 0) {
         out->share = 0;
         snprintf(out->seen, sizeof out->seen, "%s is no image of its scene", image_of(w, 0)->name);
     }
@@ -643,8 +640,8 @@ static bool expect_noise(const struct work *w, struct err *e)
 {
     for (int k = 0; k < w->check->num_images; k++) {
         const struct rubric_image *p = image_of(w, k);
-        struct submitted_image *s = &w->h->image[w->check->images[k]];
-        const struct made *made = &w->h->made[w->check->images[k]];
+        struct submitted_image *s = &w->g->h->image[w->check->images[k]];
+        const struct made *made = &w->g->h->made[w->check->images[k]];
         struct err no_rates;
         submitted_image_expect(s, expected_noise(w, k), p->spp);
         if (made->rates[0] == '\0' || !rubric_is_adaptive(p))
@@ -659,8 +656,7 @@ static bool expect_noise(const struct work *w, struct err *e)
     return true;
 }
 
-bool grade_checks_run(const struct rubric *r, const struct rubric_check *check,
-                      const struct answer_key *a, int set, struct submitted_images *h, double alpha,
+bool grade_checks_run(const struct grading *g, const struct rubric_check *check, int set,
                       struct result *out, struct err *e)
 {
     static bool (*const kinds[NUM_CHECK_KINDS])(const struct work *, struct result *,
@@ -668,15 +664,15 @@ bool grade_checks_run(const struct rubric *r, const struct rubric_check *check,
         [CHECK_EQUAL] = check_equal,  [CHECK_AGREE] = check_agree, [CHECK_SUM] = check_sum,
         [CHECK_EXACT] = check_exact,  [CHECK_NOISE] = check_noise, [CHECK_RATES] = check_rates,
         [CHECK_GROWTH] = check_growth};
-    const struct work w = {r, check, a, set, h, alpha};
+    const struct work w = {g, check, set};
     *out = (struct result){.judged = true, .image = check->images[0]};
     for (int k = 0; k < check->num_images; k++) {
         int i = check->images[k];
-        if (h->image[i].mean != NULL)
+        if (g->h->image[i].mean != NULL)
             continue;
-        snprintf(out->expected, sizeof out->expected, "image '%s'", r->image[i].name);
-        snprintf(out->seen, sizeof out->seen, "%s", h->why[i]);
-        out->judged = h->made[i].end != SANDBOX_LOST;
+        snprintf(out->expected, sizeof out->expected, "image '%s'", g->r->image[i].name);
+        snprintf(out->seen, sizeof out->seen, "%s", g->h->why[i]);
+        out->judged = g->h->made[i].end != SANDBOX_LOST;
         return true;
     }
     return expect_noise(&w, e) && kinds[check->kind](&w, out, e);

@@ -94,24 +94,29 @@ struct submitted_images {
     double bought_s;           /* CPU time of further runs */
 };
 
-/* One check against the answers with the deviations of `set`. alpha: of one check: the chance that a program which
- * is right loses points in it. Fails only for our own trouble. The caller frees with result_free(). */
-bool grade_checks_run(const struct rubric *r, const struct rubric_check *check,
-                      const struct answer_key *a, int set, struct submitted_images *h, double alpha,
+/* What a submission is judged by, and its images. */
+struct grading {
+    const struct rubric *r;
+    const struct answer_key *a;
+    struct submitted_images *h;
+    double alpha; /* of one check: the chance that a program which is right loses points in it */
+    const struct rubric_bugs *bugs; /* NULL: none are told by the images */
+};
+
+/* One check against the answers with the deviations of `set`. Fails only for our own trouble. The caller frees with result_free(). */
+bool grade_checks_run(const struct grading *g, const struct rubric_check *check, int set,
                       struct result *out, struct err *e) __attribute__((warn_unused_result));
 
 /* The times of a check of growth, whatever its images show: CPU time of P less Q over that of R less S, two scenes with many
  * and few samples, so that reading the scene and building the hierarchy cancel. Judged at the end of the interval that is best for the program. */
-void grade_checks_growth(const struct rubric *r, const struct rubric_check *c,
-                         const struct submitted_images *h, struct result *out);
+void grade_checks_growth(const struct grading *g, const struct rubric_check *c, struct result *out);
 
 /* All checks, out[0 .. num_checks-1], against the set of deviations that leaves the most points: the empty one unless
  * another brings 1 % of all points more and some image that is wrong without it is right with it, and not for its noise: a bug that
  * looks a little like it is not taken for it. What a program does wrong besides still costs. On failure there
  * is nothing to free. */
-bool grade_all_checks(const struct rubric *r, const struct answer_key *a,
-                      struct submitted_images *h, double alpha, struct result *out, int *set,
-                      struct err *e) __attribute__((warn_unused_result));
+bool grade_all_checks(const struct grading *g, struct result *out, int *set, struct err *e)
+    __attribute__((warn_unused_result));
 void result_free(struct result *r);
 
 #endif

@@ -14,82 +14,38 @@ static bool has_word(const char *words, const char *word)
     return false;
 }
 
-static bool is_hemisphere(const struct rubric_image *p, const char *scene)
-{
-    (void)scene;
-    return has_word(p->options, "-H");
-}
-
-static bool is_adaptive(const struct rubric_image *p, const char *scene)
-{
-    (void)scene;
-    return rubric_is_adaptive(p);
-}
-
-static bool is_lens(const struct rubric_image *p, const char *scene)
-{
-    (void)scene;
-    return has_word(p->options, "-b");
-}
-
-static bool has_sky(const struct rubric_image *p, const char *scene)
-{
-    (void)scene;
-    return p->environment[0] != '\0';
-}
-
-static bool has_glass(const struct rubric_image *p, const char *scene)
-{
-    (void)p;
-    return strstr(scene, "<glass") != NULL || strstr(scene, "<refraction") != NULL;
-}
-
-static bool has_mirror(const struct rubric_image *p, const char *scene)
-{
-    (void)p;
-    return strstr(scene, "<mirror") != NULL;
-}
-
-static bool has_microfacet(const struct rubric_image *p, const char *scene)
-{
-    (void)p;
-    return strstr(scene, "<microfacet") != NULL;
-}
-
-static bool is_lit(const struct rubric_image *p, const char *scene)
-{
-    (void)scene;
-    return p->bounces >= 1;
-}
-
-static bool is_bounced(const struct rubric_image *p, const char *scene)
-{
-    (void)scene;
-    return p->bounces >= 2;
-}
-
-static bool is_far(const struct rubric_image *p, const char *scene)
-{
-    (void)scene;
-    return p->bounces >= 3;
-}
-
-/* The narrowest first. */
-static const struct {
-    const char *text;
-    bool (*is)(const struct rubric_image *, const char *scene);
-} facts[] = {
-    {"only by uniform directions (-H)", is_hemisphere},
-    {"only with adaptive sampling (-a)", is_adaptive},
-    {"only through the lens (-b, -d)", is_lens},
-    {"only in light of the surroundings", has_sky},
-    {"only in scenes with glass", has_glass},
-    {"only in scenes with a mirror", has_mirror},
-    {"only in scenes with rough metal", has_microfacet},
-    {"only in light that bounced off two surfaces first", is_far},
-    {"only in light that bounced off a surface first", is_bounced},
-    {"only in light that a surface reflects: what shines by itself is right", is_lit},
+/* What may be said of an image, the narrowest first. */
+static const char *const facts[] = {
+    "only by uniform directions (-H)",
+    "only with adaptive sampling (-a)",
+    "only through the lens (-b, -d)",
+    "only in light of the surroundings",
+    "only in scenes with glass",
+    "only in scenes with a mirror",
+    "only in scenes with rough metal",
+    "only in light that bounced off two surfaces first",
+    "only in light that bounced off a surface first",
+    "only in light that a surface reflects: what shines by itself is right",
 };
+enum { NUM_FACTS_HERE = sizeof facts / sizeof *facts };
+
+/* Which of them hold. */
+static void look(const struct rubric_image *p, const char *scene, bool holds[NUM_FACTS_HERE])
+{
+    const bool is[NUM_FACTS_HERE] = {
+        has_word(p->options, "-H"),
+        rubric_is_adaptive(p),
+        has_word(p->options, "-b"),
+        p->environment[0] != '\0',
+        strstr(scene, "<glass") != NULL || strstr(scene, "<refraction") != NULL,
+        strstr(scene, "<mirror") != NULL,
+        strstr(scene, "<microfacet") != NULL,
+        p->bounces >= 3,
+        p->bounces >= 2,
+        p->bounces >= 1,
+    };
+    memcpy(holds, is, sizeof is);
+}
 
 /* "" where it cannot be read. The caller frees it. */
 static char *read_scene(const struct rubric *r, const struct rubric_image *p)
@@ -127,37 +83,37 @@ static void find_states(const struct rubric *r, const struct submitted_images *h
     }
 }
 
-struct located located_by(const struct rubric *r, const struct submitted_images *h,
-                          const double *share)
+struct located located_by(const struct grading *g, const double *share)
 {
-    enum { NUM_FACTS_HERE = sizeof facts / sizeof *facts };
     enum state state[RUBRIC_IMAGES] = {NOT_KNOWN};
-    bool holds[NUM_FACTS_HERE];
+    bool holds[NUM_FACTS_HERE], here[NUM_FACTS_HERE];
     struct located out = {.image = -1};
     int right = 0, wrong = 0;
     memset(holds, true, sizeof holds);
-    find_states(r, h, share, state);
-    for (int i = 0; i < r->num_images; i++) {
+    find_states(g->r, g->h, share, state);
+    for (int i = 0; i < g->r->num_images; i++) {
         if (state[i] == NOT_KNOWN)
             continue;
         right += state[i] == RIGHT;
         wrong += state[i] == WRONG;
         out.image = state[i] == WRONG && out.image < 0 ? i : out.image;
-        char *scene = read_scene(r, &r->image[i]);
+        char *scene = read_scene(g->r, &g->r->image[i]);
+        if (scene != NULL)
+            look(&g->r->image[i], scene, here);
         for (int f = 0; scene != NULL && f < NUM_FACTS_HERE; f++)
-            holds[f] = holds[f] && facts[f].is(&r->image[i], scene) == (state[i] == WRONG);
+            holds[f] = holds[f] && here[f] == (state[i] == WRONG);
         free(scene);
     }
     if (wrong == 0)
         return out;
     for (int f = NUM_FACTS_HERE - 1; right > 0 && f >= 0; f--)
         if (holds[f])
-            snprintf(out.text, sizeof out.text, "%s", facts[f].text);
+            snprintf(out.text, sizeof out.text, "%s", facts[f]);
     if (right == 0)
         snprintf(out.text, sizeof out.text,
                  "in every image: the camera, the geometry, the lights or the files themselves");
     else if (out.text[0] == '\0')
         snprintf(out.text, sizeof out.text, "in %d of %d images, '%.47s' the first of them", wrong,
-                 right + wrong, r->image[out.image].name);
+                 right + wrong, g->r->image[out.image].name);
     return out;
 }

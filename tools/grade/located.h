@@ -12,7 +12,6 @@ struct located {
 
 /* share: of all checks, against right images. An image that is there is wrong if an `equal` or `exact` check of it lost points, right if it
  * has such checks and none lost. Said of facts about scene, options and bounces that all wrong images share and no right one has. */
-struct located located_by(const struct rubric *r, const struct submitted_images *h,
-                          const double *share);
+struct located located_by(const struct grading *g, const double *share);
 
 #endif

@@ -7,58 +7,53 @@
 #include <string.h>
 
 /* A bug on top of deviations that were not recognised, as it spoils all images that show them. */
-static bool grade_with(const struct rubric *r, const struct answer_key *a, int set,
-                       struct submitted_images *h, double alpha, struct result *result,
-                       struct err *e)
+static bool grade_with(const struct grading *g, int set, struct result *result, struct err *e)
 {
-    for (int i = 0; i < r->num_checks; i++) {
+    for (int i = 0; i < g->r->num_checks; i++) {
         struct result other;
         if (result[i].share == 1)
             continue;
-        if (!grade_checks_run(r, &r->check[i], a, set, h, alpha, &other, e))
+        if (!grade_checks_run(g, &g->r->check[i], set, &other, e))
             return false;
         bool better = other.share > result[i].share;
         result_free(better ? &result[i] : &other);
         if (better) {
             result[i] = other;
-            snprintf(result[i].accepted, sizeof result[i].accepted, "%s", r->set[set].name);
+            snprintf(result[i].accepted, sizeof result[i].accepted, "%s", g->r->set[set].name);
         }
     }
     return true;
 }
 
-static bool is_seen(const struct rubric *r, const struct rubric_bugs *bugs,
-                    const struct submitted_images *h)
+static bool is_seen(const struct grading *g)
 {
-    for (int i = 0; bugs != NULL && i < r->num_images; i++)
-        if (rubric_bugs_can_observe(bugs, h, 0, i))
+    for (int i = 0; g->bugs != NULL && i < g->r->num_images; i++)
+        if (rubric_bugs_can_observe(g, 0, i))
             return true;
     return false;
 }
 
-bool mistake_judge(const struct rubric *r, const struct answer_key *a,
-                   const struct rubric_bugs *bugs, struct submitted_images *h, double alpha,
-                   int *set, struct result *result, struct mistake *out, struct err *e)
+bool mistake_judge(const struct grading *g, int *set, struct result *result, struct mistake *out,
+                   struct err *e)
 {
     double share[RUBRIC_CHECKS];
     bool paid[RUBRIC_PARTS] = {false};
     struct err why;
-    *out = (struct mistake){
-        .judged = true, .looked = is_seen(r, bugs, h), .with = *set, .located.image = -1};
-    for (int i = 0; i < r->num_checks; i++)
+    *out =
+        (struct mistake){.judged = true, .looked = is_seen(g), .with = *set, .located.image = -1};
+    for (int i = 0; i < g->r->num_checks; i++)
         share[i] = result[i].share;
-    if (out->looked &&
-        !rubric_bugs_diagnose(bugs, r, a, h, *set, alpha, NULL, &out->found, &out->with, &why)) {
+    if (out->looked && !rubric_bugs_diagnose(g, *set, NULL, &out->found, &out->with, &why)) {
         if (err_is_of_memory(&why))
             return err_set(e, "%s", why.msg);
         out->looked = false;
         snprintf(out->why, sizeof out->why, "%.190s", why.msg);
     }
     if (out->looked && out->found.num_named > 0) {
-        if (out->with != *set && !grade_with(r, a, out->with, h, alpha, result, e))
+        if (out->with != *set && !grade_with(g, out->with, result, e))
             return false;
         *set = out->with;
-        if (!carried_by_name(r, a, bugs, h, out->with, &out->found, alpha, result, paid, e))
+        if (!carried_by_name(g, out->with, &out->found, result, paid, e))
             return false;
     } else {
         /* The checks have shown that something is wrong: that no bug is likelier than none does not make it right. */
@@ -66,7 +61,7 @@ bool mistake_judge(const struct rubric *r, const struct answer_key *a,
             snprintf(out->found.gate, sizeof out->found.gate,
                      "no known bug, nor two of them, explains the images");
         out->found.finding = FINDING_UNKNOWN;
-        out->located = located_by(r, h, share);
+        out->located = located_by(g, share);
     }
-    return carried_by_ratio(r, a, *set, h, alpha, share, paid, result, e);
+    return carried_by_ratio(g, *set, share, paid, result, e);
 }

@@ -15,11 +15,9 @@ struct mistake {
 };
 
 /* result: of all checks as graded with the deviations of *set; points that were lost for what another part pays come back. Where a bug is found on
- * top of other accepted deviations, *set becomes those. bugs NULL: nothing is named. Only for programs that
+ * top of other accepted deviations, *set becomes those. Only for programs that
  * lost points. Fails only for our own trouble. */
-bool mistake_judge(const struct rubric *r, const struct answer_key *a,
-                   const struct rubric_bugs *bugs, struct submitted_images *h, double alpha,
-                   int *set, struct result *result, struct mistake *out, struct err *e)
-    __attribute__((warn_unused_result));
+bool mistake_judge(const struct grading *g, int *set, struct result *result, struct mistake *out,
+                   struct err *e) __attribute__((warn_unused_result));
 
 #endif

@@ -72,21 +72,19 @@ bool rubric_bugs_key(const struct rubric *r, int set, int image, char name[128],
     return true;
 }
 
-bool rubric_bugs_can_observe(const struct rubric_bugs *b, const struct submitted_images *h, int set,
-                             int image)
+bool rubric_bugs_can_observe(const struct grading *g, int set, int image)
 {
-    return b->view[set][image] >= 0 && h->image[image].mean != NULL;
+    return g->bugs->view[set][image] >= 0 && g->h->image[image].mean != NULL;
 }
 
-bool rubric_bugs_observe(const struct rubric_bugs *b, const struct rubric *r,
-                         const struct answer_key *a, const struct submitted_images *h, int set,
-                         int image, struct observation *out, struct err *e)
+bool rubric_bugs_observe(const struct grading *g, int set, int image, struct observation *out,
+                         struct err *e)
 {
-    const struct view *v = &b->catalogue.view[b->view[set][image]];
-    struct answer right = a->of[rubric_bugs_set(a, set, image)][image];
-    right.as_asked = *answer_key_counts(a, set, image);
+    const struct view *v = &g->bugs->catalogue.view[g->bugs->view[set][image]];
+    struct answer right = g->a->of[rubric_bugs_set(g->a, set, image)][image];
+    right.as_asked = *answer_key_counts(g->a, set, image);
     *out = (struct observation){.view = v, .is_consistent = true};
-    return rubric_sight_of_student(r, image, h, &right, &v->correct, &out->seen, e);
+    return rubric_sight_of_student(g->r, image, g->h, &right, &v->correct, &out->seen, e);
 }
 
 /* What is seen of a submission with one set of deviations. */
@@ -161,21 +159,21 @@ static bool expect_mean_over_all(const struct rubric_image *p, const char *rates
 
 /* How many samples are taken says something of the rule of stopping alone, once the program's own light and noise are known:
  * what each rule takes with these replaces what the catalogue's bugs took with ours. */
-static bool expect_samples(const struct rubric_bugs *b, const struct rubric *r,
-                           const struct answer_key *a, const struct submitted_images *h, int set,
-                           int image, struct sights *s, struct err *e)
+static bool expect_samples(const struct grading *g, int set, int image, struct sights *s,
+                           struct err *e)
 {
+    const struct catalogue *c = &g->bugs->catalogue;
     struct stopping by[NUM_STOPPING_KINDS] = {0};
     struct observation *clue = &s->clue[s->num - 1];
     struct view *own = &s->own[s->num - 1];
-    const struct rubric_image *p = &r->image[image];
+    const struct rubric_image *p = &g->r->image[image];
     struct err why;
     if (isnan(clue->seen.fact[FACT_SAMPLES]))
         return true;
-    if (is_clipped(&h->image[image]))
+    if (is_clipped(&g->h->image[image]))
         clue->seen.fact[FACT_SAMPLES] = NAN;
-    else if (!stopping_rule_samples(&r->image[image], &h->image[image],
-                                    answer_key_image(a, set, image), by, &why)) {
+    else if (!stopping_rule_samples(&g->r->image[image], &g->h->image[image],
+                                    answer_key_image(g->a, set, image), by, &why)) {
         clue->seen.fact[FACT_SAMPLES] = NAN;
         return !err_is_of_memory(&why) || err_set(e, "%s", why.msg);
     }
@@ -186,14 +184,14 @@ static bool expect_samples(const struct rubric_bugs *b, const struct rubric *r,
     clue->seen.fact[FACT_SAMPLES] = progress(p, taken);
     clue->seen.fact_sd[FACT_SAMPLES] = (progress(p, taken + sd) - progress(p, taken - sd)) / 2;
     *own = *clue->view;
-    own->effect = calloc((size_t)b->catalogue.num_bugs, sizeof(struct effect *));
+    own->effect = calloc((size_t)c->num_bugs, sizeof(struct effect *));
     if (own->effect == NULL)
         return err_set(e, "out of memory");
     set_samples(p, &by[STOPS_RIGHTLY], clue->seen.fact[FACT_SAMPLES], own->correct.fact,
                 own->correct.fact_sd);
-    for (int k = 0; k < b->catalogue.num_bugs; k++) {
+    for (int k = 0; k < c->num_bugs; k++) {
         const struct effect *plain = clue->view->effect[k];
-        enum stopping_kind kind = stopping_rule_of(b->catalogue.bug[k].name);
+        enum stopping_kind kind = stopping_rule_of(c->bug[k].name);
         if (plain == NULL && kind == STOPS_RIGHTLY)
             continue;
         struct effect *mine = calloc(1, sizeof *mine);
@@ -205,34 +203,32 @@ static bool expect_samples(const struct rubric_bugs *b, const struct rubric *r,
         for (int f = 0; plain == NULL && f < NUM_FACTS; f++)
             mine->fact[f] = mine->fact_sd[f] = NAN;
         set_samples(p, &by[kind], clue->seen.fact[FACT_SAMPLES], mine->fact, mine->fact_sd);
-        if (strcmp(b->catalogue.bug[k].name, "adaptive_mean_over_all") == 0 &&
-            !expect_mean_over_all(p, h->made[image].rates, &own->correct, mine, e))
+        if (strcmp(c->bug[k].name, "adaptive_mean_over_all") == 0 &&
+            !expect_mean_over_all(p, g->h->made[image].rates, &own->correct, mine, e))
             return false;
     }
     clue->view = own;
     return true;
 }
 
-static bool look(const struct rubric_bugs *b, const struct rubric *r, const struct answer_key *a,
-                 const struct submitted_images *h, int set, struct sights *out, struct err *e)
+static bool look(const struct grading *g, int set, struct sights *out, struct err *e)
 {
     forget(out);
-    out->bugs = b->catalogue.num_bugs;
-    for (int i = 0; i < r->num_images; i++)
-        if (rubric_bugs_can_observe(b, h, set, i) &&
-            (!rubric_bugs_observe(b, r, a, h, set, i, &out->clue[out->num++], e) ||
-             (rubric_sight_counts(r, i) && !expect_samples(b, r, a, h, set, i, out, e))))
+    out->bugs = g->bugs->catalogue.num_bugs;
+    for (int i = 0; i < g->r->num_images; i++)
+        if (rubric_bugs_can_observe(g, set, i) &&
+            (!rubric_bugs_observe(g, set, i, &out->clue[out->num++], e) ||
+             (rubric_sight_counts(g->r, i) && !expect_samples(g, set, i, out, e))))
             return false;
     return true;
 }
 
-bool rubric_bugs_diagnose(const struct rubric_bugs *b, const struct rubric *r,
-                          const struct answer_key *a, const struct submitted_images *h, int set,
-                          double alpha, const char *without, struct diagnosis *found, int *with,
-                          struct err *e)
+bool rubric_bugs_diagnose(const struct grading *g, int set, const char *without,
+                          struct diagnosis *found, int *with, struct err *e)
 {
-    double clip = rubric_sight_clip(r);
-    struct diagnose_options opt = {.alpha = alpha,
+    const struct catalogue *c = &g->bugs->catalogue;
+    double clip = rubric_sight_clip(g->r);
+    struct diagnose_options opt = {.alpha = g->alpha,
                                    .without = without,
                                    .by_likelihood = true,
                                    .clip = isfinite(clip) ? clip : 0};
@@ -241,20 +237,19 @@ bool rubric_bugs_diagnose(const struct rubric_bugs *b, const struct rubric *r,
     double best = -INFINITY;
     *found = (struct diagnosis){0};
     *with = set;
-    for (int k = 0; ok && k < r->num_sets && !(*with == set && found->num_named > 0); k++) {
+    for (int k = 0; ok && k < g->r->num_sets && !(*with == set && found->num_named > 0); k++) {
         int tried = k == 0 ? set : k <= set ? k - 1 : k; /* `set` first */
         struct diagnosis other;
-        ok = look(b, r, a, h, tried, seen, e);
+        ok = look(g, tried, seen, e);
         if (!ok || seen->num == 0)
             break;
-        ok = diagnose(&b->catalogue, seen->clue, seen->num, &opt, &other, e);
+        ok = diagnose(c, seen->clue, seen->num, &opt, &other, e);
         double likelihood = ok && other.num_named > 0
                                 ? other.log_likelihood + other.candidate[0].log_likelihood
                                 : -INFINITY;
         if (ok && (k == 0 || likelihood > best)) {
             /* Other deviations with a bug have to be likelier than these with none: a bug may be such a deviation. */
-            best =
-                k == 0 ? other.log_likelihood + diagnose_bound(&b->catalogue, alpha) : likelihood;
+            best = k == 0 ? other.log_likelihood + diagnose_bound(c, g->alpha) : likelihood;
             *found = other;
             *with = tried;
         }
@@ -264,19 +259,19 @@ bool rubric_bugs_diagnose(const struct rubric_bugs *b, const struct rubric *r,
     int likely = *with;
     opt.pairs = true;
     best = -INFINITY;
-    for (int k = 0; ok && k < r->num_sets; k++) {
+    for (int k = 0; ok && k < g->r->num_sets; k++) {
         int tried = k == 0 ? *with : k <= *with ? k - 1 : k;
         struct diagnosis two;
-        ok = look(b, r, a, h, tried, seen, e);
+        ok = look(g, tried, seen, e);
         if (!ok || seen->num == 0 || (single && k > 0))
             break;
-        ok = diagnose(&b->catalogue, seen->clue, seen->num, &opt, &two, e);
+        ok = diagnose(c, seen->clue, seen->num, &opt, &two, e);
         double likelihood = ok && two.num_named > 0 && (k == 0 || two.candidate[0].second >= 0)
                                 ? two.log_likelihood + two.candidate[0].log_likelihood
                                 : -INFINITY;
         if (ok && (k == 0 || likelihood > best)) {
             best = k == 0 && two.num_named == 0 ? two.log_likelihood + fmax(0, two.largest_lead) +
-                                                      diagnose_bound(&b->catalogue, alpha)
+                                                      diagnose_bound(c, g->alpha)
                                                 : likelihood;
             *found = two;
             likely = tried;

@@ -33,20 +33,16 @@ bool rubric_bugs_open(const struct rubric *r, const struct answer_key *a, struct
 void rubric_bugs_close(struct rubric_bugs *b);
 
 /* Has the image a view with these deviations, and did the student make it? If so: its cells. */
-bool rubric_bugs_can_observe(const struct rubric_bugs *b, const struct submitted_images *h, int set,
-                             int image);
-bool rubric_bugs_observe(const struct rubric_bugs *b, const struct rubric *r,
-                         const struct answer_key *a, const struct submitted_images *h, int set,
-                         int image, struct observation *out, struct err *e)
-    __attribute__((warn_unused_result));
+bool rubric_bugs_can_observe(const struct grading *g, int set, int image);
+bool rubric_bugs_observe(const struct grading *g, int set, int image, struct observation *out,
+                         struct err *e) __attribute__((warn_unused_result));
 
 /* What these images look like, graded with the deviations of `set`; where no bug explains them with those, with any
  * other set. found->finding is FINDING_CORRECT where nothing was seen; *with: the set by which it was found. A right program
  * is told a bug with a probability of at most alpha for each set, as far as its images are independent (not if all
  * have one seed). without: as in struct diagnose_options. */
-bool rubric_bugs_diagnose(const struct rubric_bugs *b, const struct rubric *r,
-                          const struct answer_key *a, const struct submitted_images *h, int set,
-                          double alpha, const char *without, struct diagnosis *found, int *with,
-                          struct err *e) __attribute__((warn_unused_result));
+bool rubric_bugs_diagnose(const struct grading *g, int set, const char *without,
+                          struct diagnosis *found, int *with, struct err *e)
+    __attribute__((warn_unused_result));
 
 #endif

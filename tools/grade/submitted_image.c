@@ -26,19 +26,20 @@ static bool check_header(const char *path, int width, int height, struct image_i
     return info->channels <= 64 || err_set(e, "the image has %d channels", info->channels);
 }
 
+/* All planes as one block, the means first. */
 static bool allocate(struct submitted_image *s, struct err *e)
 {
-    size_t n = 3 * (size_t)s->width * (size_t)s->height;
-    s->mean = calloc(n, sizeof *s->mean);
-    s->tolerance = calloc(n, sizeof *s->tolerance);
-    s->rounding = calloc(n, sizeof *s->rounding);
-    s->variance = calloc(n, sizeof *s->variance);
-    s->k3 = calloc(n, sizeof *s->k3);
-    s->clipped = calloc(n, 1);
-    s->measured = calloc(n / 3 * 4, sizeof *s->measured);
-    return (s->variance != NULL && s->k3 != NULL && s->mean != NULL && s->tolerance != NULL &&
-            s->rounding != NULL && s->clipped != NULL && s->measured != NULL) ||
-           err_set(e, "out of memory for %d x %d pixels", s->width, s->height);
+    size_t n = 3 * (size_t)s->width * (size_t)s->height, all = 5 * n + n / 3 * 4;
+    s->mean = calloc(1, all * sizeof *s->mean + n);
+    if (s->mean == NULL)
+        return err_set(e, "out of memory for %d x %d pixels", s->width, s->height);
+    s->tolerance = s->mean + n;
+    s->rounding = s->tolerance + n;
+    s->variance = s->rounding + n;
+    s->k3 = s->variance + n;
+    s->measured = s->k3 + n;
+    s->clipped = (unsigned char *)(s->mean + all);
+    return true;
 }
 
 static void set_code(struct submitted_image *s, size_t i, const struct curve *curve, int k,
@@ -107,20 +108,9 @@ bool submitted_image_read(const char *path, const char *curve, int width, int he
     return ok;
 }
 
-static void free_planes(struct submitted_image *s)
-{
-    free(s->mean);
-    free(s->tolerance);
-    free(s->rounding);
-    free(s->variance);
-    free(s->k3);
-    free(s->clipped);
-    free(s->measured);
-}
-
 void submitted_image_free(struct submitted_image *s)
 {
-    free_planes(s);
+    free(s->mean);
     for (int k = 0; k < s->num_runs; k++)
         submitted_image_free(&s->run[k]);
     free(s->run);
@@ -206,10 +196,8 @@ bool submitted_image_add_run(struct submitted_image *s, struct submitted_image *
     s->run = run;
     if (s->num_runs == 0) { /* what it is becomes the first of its runs */
         struct submitted_image mean = *s;
-        if (!allocate(&mean, e)) {
-            free_planes(&mean);
+        if (!allocate(&mean, e))
             return false;
-        }
         s->run = NULL;
         run[0] = *s;
         *s = mean;
@@ -262,10 +250,8 @@ bool submitted_image_from(const struct moments *m, const struct submitted_image 
                                     .clip = like->clip,
                                     .known = m != NULL,
                                     .runs_dof = m != NULL ? 0 : INFINITY};
-    if (!allocate(out, e)) {
-        submitted_image_free(out);
+    if (!allocate(out, e))
         return false;
-    }
     for (size_t i = 0; m != NULL && i < 3 * (size_t)m->width * (size_t)m->height; i++) {
         double n = m->n[i / 3];
         out->mean[i] = fmin(m->mean[i], like->clip);

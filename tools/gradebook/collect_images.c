@@ -40,7 +40,7 @@ static bool make_image(const struct collect *c, const struct rubric_image *p, st
     struct err wrong = {""};
     if (made->why[0] == '\0' &&
         !submission_image(job->rubric, job->sandbox, c->submission, p, job->stage, c->work, c->out,
-                          image_seed(job->seed, p->name), job->threads, made, e))
+                          image_seed(job->s->seed, p->name), job->s->threads, made, e))
         return false;
     if (made->path[0] != '\0' && access(made->path, R_OK) != 0)
         return err_set(e, "%s: %s", made->path, strerror(errno));
@@ -357,6 +357,7 @@ bool collect_until_decided(const struct collect *c, struct submitted_images *h, 
                            int *set, struct err *e)
 {
     const struct rubric *r = c->job->rubric;
+    const struct grading g = {r, c->job->answers, h, c->job->s->alpha, NULL};
     struct purchases *b = calloc(1, sizeof *b);
     bool ok = b != NULL || err_set(e, "out of memory");
     if (ok)
@@ -364,7 +365,7 @@ bool collect_until_decided(const struct collect *c, struct submitted_images *h, 
     for (int i = 0; ok && i < r->num_images; i++)
         b->tried[i][b->num[i]++] = r->image[i].spp;
     for (int image = 0, spp = 0; ok && image >= 0;) {
-        ok = grade_all_checks(r, c->job->answers, h, c->job->alpha, out, set, e);
+        ok = grade_all_checks(&g, out, set, e);
         image = ok ? cheapest(c, h, out, b, &spp) : -1;
         if (image < 0)
             break;

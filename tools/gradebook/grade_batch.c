@@ -31,7 +31,7 @@ static bool key_of(const struct grade_job *job, const struct submission *s, char
         return false;
     appeals_key(job->appeals, s->id, appeals);
     snprintf(text, sizeof text, "%s %s %s %s %s %s %llu %.17g %d %d", assay_version, rubric, scenes,
-             bugs, appeals, s->sha256, (unsigned long long)job->seed, job->alpha,
+             bugs, appeals, s->sha256, (unsigned long long)job->s->seed, job->s->alpha,
              job->sandbox->unsafe, job->rubric->variant);
     sha256_text(text, key);
     return true;
@@ -116,14 +116,14 @@ static void tell_provisional(struct result *result)
 static bool find_mistake(const struct grade_job *job, struct submitted_images *h, int *set,
                          struct result *result, struct mistake *out, struct err *e)
 {
+    const struct grading g = {job->rubric, job->answers, h, job->s->alpha, job->bugs};
     bool lost = false, flagged = false;
     for (int i = 0; i < job->rubric->num_checks; i++) {
         lost |= result[i].share < 1;
         flagged |= result[i].flag[0] != '\0';
     }
     *out = (struct mistake){.located.image = -1};
-    return !lost || flagged ||
-           mistake_judge(job->rubric, job->answers, job->bugs, h, job->alpha, set, result, out, e);
+    return !lost || flagged || mistake_judge(&g, set, result, out, e);
 }
 
 static bool add_checks(const struct collect *c, struct submitted_images *h, json_t *grade,
@@ -157,15 +157,11 @@ static bool add_checks(const struct collect *c, struct submitted_images *h, json
         json_array_append_new(images, image_json(r, h, i));
         cpu_s += h->made[i].cpu_s;
     }
-    json_object_set_new(grade, "points", json_real(points));
-    json_object_set_new(grade, "of", json_real(rubric_points(r)));
-    json_object_set_new(grade, "chance", json_real(chance));
-    json_object_set_new(grade, "cpu_s", json_real(cpu_s + h->bought_s));
-    json_object_set_new(grade, "provisional", json_boolean(provisional));
-    json_object_set_new(grade, "accepted", json_string(r->set[set].name));
-    json_object_set_new(grade, "parts", parts);
-    json_object_set_new(grade, "checks", checks);
-    json_object_set_new(grade, "pictures", images);
+    json_object_update_new(grade, json_pack("{sf, sf, sf, sf, sb, ss, so, so, so}", "points",
+                                            points, "of", rubric_points(r), "chance", chance,
+                                            "cpu_s", cpu_s + h->bought_s, "provisional",
+                                            provisional, "accepted", r->set[set].name, "parts",
+                                            parts, "checks", checks, "pictures", images));
     return ok;
 }
 
@@ -177,8 +173,8 @@ static json_t *name_bug(const struct grade_job *job, const struct submission *s,
     if (job->diagnosis == NULL || s->kind == SUBMISSION_IMAGES || s->why[0] != '\0' ||
         json_array_size(json_object_get(by_images, "named")) == 1)
         return by_images;
-    json_t *by_views = grade_diagnose_of(job->diagnosis, job->sandbox, s, work, job->seed,
-                                         job->threads, job->alpha);
+    json_t *by_views = grade_diagnose_of(job->diagnosis, job->sandbox, s, work, job->s->seed,
+                                         job->s->threads, job->s->alpha);
     size_t views = json_array_size(json_object_get(by_views, "named")),
            images = json_array_size(json_object_get(by_images, "named"));
     bool better = json_is_null(by_images) || (views > 0 && (images == 0 || views < images));
@@ -238,7 +234,7 @@ static bool grade_anew(const struct grade_job *job, const char *path, const char
                        const char *key, const json_t *old, struct submission *s, json_t **grade,
                        struct err *e)
 {
-    const struct path out = fs_path("%s/%s", job->out, s->id);
+    const struct path out = fs_path("%s/%s", job->s->out, s->id);
     const struct path log = fs_path("%s/build.log", out.s);
     if (!fs_remove_tree(out.s, e) || !fs_make_dirs(out.s, e) ||
         !submission_build(job->rubric, job->sandbox, job->build_cache, false, work, log.s, s, e))
@@ -249,8 +245,8 @@ static bool grade_anew(const struct grade_job *job, const char *path, const char
     *grade = json_pack("{si, ss, ss, so?, ss, ss, ss, sb, sI, sf, sn}", "assay_grade", 1, "id",
                        s->id, "kind", submission_kind_name[s->kind], "command", command, "version",
                        assay_version, "key", key, "rubric", job->rubric->title, "sandbox",
-                       !job->sandbox->unsafe, "seed", (json_int_t)job->seed, "alpha", job->alpha,
-                       "trouble");
+                       !job->sandbox->unsafe, "seed", (json_int_t)job->s->seed, "alpha",
+                       job->s->alpha, "trouble");
     if (job->rubric->variant > 0)
         json_object_set_new(*grade, "variant", json_integer(job->rubric->variant));
     if (access(log.s, R_OK) == 0)
@@ -275,14 +271,14 @@ static bool grade_one(const struct grade_job *job, const char *path, const char 
     char key[65];
     if (!submission_open(job->rubric, path, work, &s, e) || !key_of(job, &s, key, e))
         return false;
-    const struct path runs = fs_path("%s/.runs/%s", job->before, s.id);
+    const struct path runs = fs_path("%s/.runs/%s", job->s->before, s.id);
     s.runs = runs.s;
-    s.runs_again = job->again;
-    *grade = json_load_file(fs_path("%s/%s/grade.json", job->out, s.id).s, 0, NULL);
-    if (!job->again && strcmp(member_or_empty(*grade, "key"), key) == 0)
+    s.runs_again = job->s->again;
+    *grade = json_load_file(fs_path("%s/%s/grade.json", job->s->out, s.id).s, 0, NULL);
+    if (!job->s->again && strcmp(member_or_empty(*grade, "key"), key) == 0)
         return true;
     json_decref(*grade);
-    json_t *old = json_load_file(fs_path("%s/%s/grade.json", job->before, s.id).s, 0, NULL);
+    json_t *old = json_load_file(fs_path("%s/%s/grade.json", job->s->before, s.id).s, 0, NULL);
     *grade = NULL;
     bool ok = grade_anew(job, path, work, key, old, &s, grade, e);
     json_decref(old);
@@ -315,17 +311,16 @@ static void *work(void *ctx)
         pthread_mutex_lock(&b->lock);
         int i = b->next++;
         pthread_mutex_unlock(&b->lock);
-        if (i >= job->num)
+        if (i >= job->s->num)
             return NULL;
         const struct path dir = fs_path("%s/work-%d", job->sandbox->dir.path, i);
-        if (!grade_one(job, job->path[i], dir.s, &b->grade[i], &e))
-            b->grade[i] = trouble_json(job, job->path[i], e.msg);
+        if (!grade_one(job, job->s->submission[i], dir.s, &b->grade[i], &e))
+            b->grade[i] = trouble_json(job, job->s->submission[i], e.msg);
         bool removed = fs_remove_tree(dir.s, &ignored);
         (void)removed; /* goes with the sandbox's directory */
         pthread_mutex_lock(&b->lock);
         b->done++;
-        if (job->done != NULL)
-            job->done(job->ctx, b->done, job->path[i], b->grade[i]);
+        job->done(job->s, b->done, b->grade[i]);
         pthread_mutex_unlock(&b->lock);
     }
 }
@@ -333,16 +328,17 @@ static void *work(void *ctx)
 static bool check_ids(const struct grade_job *job, struct err *e)
 {
     char id[128], other[128];
-    for (int i = 0; i < job->num; i++) {
-        submission_id(job->path[i], id);
+    for (int i = 0; i < job->s->num; i++) {
+        submission_id(job->s->submission[i], id);
         json_t *text = json_string(id); /* NULL: no UTF-8 */
         json_decref(text);
         if (id[0] == '\0' || strlen(id) > 120 || id[0] == '.' || text == NULL)
-            return err_set(e, "%s: '%s' is no name for a submission", job->path[i], id);
+            return err_set(e, "%s: '%s' is no name for a submission", job->s->submission[i], id);
         for (int k = 0; k < i; k++) {
-            submission_id(job->path[k], other);
+            submission_id(job->s->submission[k], other);
             if (strcmp(id, other) == 0)
-                return err_set(e, "%s and %s would both be '%s'", job->path[k], job->path[i], id);
+                return err_set(e, "%s and %s would both be '%s'", job->s->submission[k],
+                               job->s->submission[i], id);
         }
     }
     return true;
@@ -353,10 +349,10 @@ bool grade_batch_run(const struct grade_job *job, json_t **grades, struct err *e
     enum { MOST_JOBS = 64 };
     pthread_t thread[MOST_JOBS];
     struct batch b = {.job = job, .lock = PTHREAD_MUTEX_INITIALIZER};
-    int started = 0, jobs = job->jobs < MOST_JOBS ? job->jobs : MOST_JOBS;
-    if (!check_ids(job, e) || !fs_make_dirs(job->out, e))
+    int started = 0, jobs = job->s->jobs < MOST_JOBS ? job->s->jobs : MOST_JOBS;
+    if (!check_ids(job, e) || !fs_make_dirs(job->s->out, e))
         return false;
-    b.grade = calloc((size_t)job->num, sizeof(json_t *));
+    b.grade = calloc((size_t)job->s->num, sizeof(json_t *));
     *grades = json_array();
     if (b.grade == NULL || *grades == NULL) {
         free(b.grade);
@@ -369,7 +365,7 @@ bool grade_batch_run(const struct grade_job *job, json_t **grades, struct err *e
         work(&b);
     for (int k = 0; k < started; k++)
         pthread_join(thread[k], NULL);
-    for (int i = 0; i < job->num; i++)
+    for (int i = 0; i < job->s->num; i++)
         json_array_append_new(*grades, b.grade[i]);
     free(b.grade);
     return true;

@@ -4,6 +4,7 @@
 
 #include "appeals.h"
 #include "grade_diagnose.h"
+#include "grade_options.h"
 #include "tools/grade/grade_checks.h"
 
 #include <jansson.h>
@@ -14,22 +15,14 @@ struct grade_job {
     const struct sandbox *sandbox;
     const char *stage;       /* submission_stage() */
     const char *build_cache; /* that everybody can read (submission_build()); NULL: none */
-    const char *out;         /* OUT/ID/grade.json and what else there is of it */
-    const char *const *path; /* of the submissions */
     const char *const *word; /* grade_options_words(), for "command" of a grade; NULL: not said */
-    int num, jobs, threads;
-    double alpha;                            /* of one check */
+    const struct grade_settings
+        *s; /* submissions, how many at a time, where OUT/ID/grade.json goes, .. */
     const struct rubric_bugs *bugs;          /* NULL: bugs are not named by the images */
     const struct grade_diagnosis *diagnosis; /* NULL: nor by more of them */
-    uint64_t seed;
-    bool again; /* also those that have been graded already, and run anew what has been run */
-    const char *
-        before; /* OUT of a run before this one, maybe the same: its images are judged anew where nothing that decides them
-                         * changed, and what changed in points is "before" of a grade */
-    const struct appeals *appeals; /* NULL: none */
-    void (*done)(void *ctx, int num, const char *id,
-                 const json_t *grade); /* one at a time; may be NULL */
-    void *ctx;
+    const struct appeals *appeals;           /* NULL: none */
+    /* One at a time. */
+    void (*done)(const struct grade_settings *s, int num, const json_t *grade);
 };
 
 /* OUT/ID/grade.json, and a grade below: tools/docs/formats/grades.md. Texts of programs are in it: whoever shows them has to

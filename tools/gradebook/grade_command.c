@@ -72,22 +72,14 @@ static bool print_mistakes(const struct rubric *r, const struct rubric_mistakes 
                                   m->at[0].line, m->at[0].text);
 }
 
-struct progress {
-    int num;
-    bool quiet;
-};
-
-static void tell(void *ctx, int num, const char *path, const json_t *grade)
+static void tell(const struct grade_settings *s, int num, const json_t *grade)
 {
-    const struct progress *p = ctx;
-    const char *trouble = json_string_value(json_object_get(grade, "trouble")),
-               *wrong = json_string_value(json_object_get(grade, "wrong"));
+    const char *trouble = member_text(grade, "trouble"), *wrong = member_text(grade, "wrong");
     char change[1024];
-    (void)path;
     grade_change_text(grade, change, sizeof change);
-    if (p->quiet)
+    if (s->quiet)
         return;
-    printf("[%d/%d] %-32s ", num, p->num, json_string_value(json_object_get(grade, "id")));
+    printf("[%d/%d] %-32s ", num, s->num, member_text(grade, "id"));
     if (trouble != NULL)
         printf("NOT GRADED: %s\n", trouble);
     else
@@ -143,7 +135,6 @@ static int run_batch(const struct grade_settings *s, const struct rubric *r,
 {
     char stage[sizeof box->dir.path + 16];
     const struct path cache = fs_path("%s/cache", box->dir.path);
-    struct progress p = {s->num, s->quiet};
     struct grade_diagnosis diagnosis = {0};
     struct rubric_bugs *bugs = calloc(1, sizeof *bugs);
     struct appeals appeals = {0};
@@ -152,19 +143,10 @@ static int run_batch(const struct grade_settings *s, const struct rubric *r,
                             .sandbox = box,
                             .stage = stage,
                             .build_cache = s->build_cache != NULL ? cache.s : NULL,
-                            .out = s->out,
-                            .path = s->submission,
                             .word = word,
-                            .num = s->num,
-                            .jobs = s->jobs == 0 ? cli_processors() : s->jobs,
-                            .threads = s->threads,
-                            .alpha = s->alpha,
-                            .seed = s->seed,
-                            .again = s->again,
-                            .before = s->before != NULL ? s->before : s->out,
+                            .s = s,
                             .appeals = &appeals,
-                            .done = tell,
-                            .ctx = &p};
+                            .done = tell};
     json_t *grades = NULL;
     int code = EXIT_NOT_JUDGED;
     snprintf(stage, sizeof stage, "%s/stage", box->dir.path);
@@ -209,10 +191,8 @@ static bool open_box(const struct grade_settings *s, const struct rubric *r, con
                      const char *pathtracer, struct sandbox *box, struct err *e)
 {
     const struct data_dirs at = data_dirs_find();
-    const char *const ours[] = {
-        at.share.s, s->golden, s->suite, s->catalogue,
-        r->dir,     cache,     s->out,   s->before != NULL ? s->before : s->out,
-        pathtracer};
+    const char *const ours[] = {at.share.s, s->golden, s->suite,  s->catalogue, r->dir,
+                                cache,      s->out,    s->before, pathtracer};
     enum { NUM = sizeof ours / sizeof *ours };
     const char **hidden = calloc((size_t)(NUM + s->num) + 1, sizeof *hidden);
     if (hidden == NULL)

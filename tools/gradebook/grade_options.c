@@ -66,6 +66,8 @@ bool grade_options_parse(int argc, char **argv, struct grade_settings *s, struct
 {
     if (!cli_read(options, argc, argv, s, e) || s->help)
         return s->help;
+    s->before = s->before != NULL ? s->before : s->out;
+    s->jobs = s->jobs > 0 ? s->jobs : cli_processors();
     if (s->rubric == NULL)
         return err_set(e, "no rubric given (see --help)");
     if ((s->only_check || s->prepare) && s->num > 0)
@@ -103,9 +105,8 @@ char **grade_options_words(int argc, char **argv, const struct grade_settings *s
 
 struct path grade_options_references(const struct grade_settings *s)
 {
-    if (s->references != NULL)
-        return fs_path("%s", s->references);
-    return fs_path("%s/.references", s->before != NULL ? s->before : s->out);
+    return s->references != NULL ? fs_path("%s", s->references)
+                                 : fs_path("%s/.references", s->before);
 }
 
 void grade_options_help(void)

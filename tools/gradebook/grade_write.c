@@ -100,7 +100,7 @@ static double execution_time(const json_t *grade)
  * score of the whole, which Gradescope adds up. */
 static json_t *gradescope(const json_t *grade)
 {
-    json_t *tests = json_array(), *root = json_object();
+    json_t *tests = json_array();
     size_t i;
     json_t *c;
     json_array_foreach(json_object_get(grade, "checks"), i, c) {
@@ -118,18 +118,13 @@ static json_t *gradescope(const json_t *grade)
     }
     char whole[2048];
     describe_whole(grade, whole, sizeof whole);
-    json_object_set_new(root, "output", json_string(whole));
-    json_object_set_new(root, "execution_time", json_real(execution_time(grade)));
-    json_object_set_new(root, "output_format", json_string("text"));
-    json_object_set_new(root, "test_output_format", json_string("text"));
-    json_object_set_new(root, "visibility", json_string("visible"));
-    json_object_set_new(root, "stdout_visibility", json_string("hidden"));
-    if (json_array_size(tests) > 0) {
-        json_object_set_new(root, "tests", tests);
-    } else {
-        json_decref(tests);
-        json_object_set_new(root, "score", json_real(0));
-    }
+    bool any = json_array_size(tests) > 0;
+    json_t *root =
+        json_pack("{so*, sf, ss, ss, ss, ss}", "output", json_string(whole), "execution_time",
+                  execution_time(grade), "output_format", "text", "test_output_format", "text",
+                  "visibility", "visible", "stdout_visibility", "hidden");
+    json_object_set_new(root, any ? "tests" : "score", any ? json_incref(tests) : json_real(0));
+    json_decref(tests);
     return root;
 }
 

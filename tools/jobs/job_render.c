@@ -77,25 +77,18 @@ static bool add_words(struct plan *p, int argc, char **argv, const struct option
     snprintf(t, sizeof t, "%d", threads);
     snprintf(spp, sizeof spp, "%d", o->spp);
     snprintf(samples, sizeof samples, "%d:%d", o->first, o->last);
-    const char *const first[] = {program,
-                                 "-q",
-                                 "-t",
-                                 t,
-                                 "--keep-state",
-                                 "-f",
-                                 "{out}/cell.png",
-                                 "{job}",
-                                 ranges ? "-s" : "--samples",
-                                 ranges ? spp : samples};
     bool some = ranges || o->first > 0 || o->last < o->spp;
     char **word = calloc((size_t)argc, sizeof *word);
     if (word == NULL)
         return err_set(e, "out of memory");
     int num = cli_rewrite_kept(cli_rewrite_render, argc - 1, argv + 1, word);
     num = cli_rewrite_kept(cells_and_threads, num, word, word);
-    bool ok =
-        plan_run_words(p, first, (int)(sizeof first / sizeof *first) - (some ? 0 : 2), false, e) &&
-        plan_run_words(p, (const char *const *)word, num, true, e);
+    bool ok = plan_run_words(p,
+                             (const char *const[]){
+                                 program, "-q", "-t", t, "--keep-state", "-f", "{out}/cell.png",
+                                 "{job}", ranges ? "-s" : "--samples", ranges ? spp : samples},
+                             some ? 10 : 8, false, e) &&
+              plan_run_words(p, (const char *const *)word, num, true, e);
     free(word);
     return ok;
 }

@@ -30,26 +30,23 @@ const char *assay_build(void)
     return assay_version;
 }
 
+static const enum verdict verdicts[] = {[ASSAY_EQUIVALENT] = VERDICT_EQUIVALENT,
+                                        [ASSAY_DIFFERENT] = VERDICT_DIFFERENT,
+                                        [ASSAY_INCONCLUSIVE] = VERDICT_INCONCLUSIVE,
+                                        [ASSAY_NOTHING_FOUND] = VERDICT_NOTHING_FOUND};
+enum { NUM_VERDICTS = sizeof verdicts / sizeof *verdicts };
+
 static enum assay_verdict public_verdict(enum verdict v)
 {
-    switch (v) {
-    case VERDICT_EQUIVALENT: return ASSAY_EQUIVALENT;
-    case VERDICT_DIFFERENT: return ASSAY_DIFFERENT;
-    case VERDICT_NOTHING_FOUND: return ASSAY_NOTHING_FOUND;
-    case VERDICT_INCONCLUSIVE: break;
-    }
-    return ASSAY_INCONCLUSIVE;
+    int i = 0;
+    while (verdicts[i] != v)
+        i++;
+    return (enum assay_verdict)i;
 }
 
 const char *assay_verdict_name(enum assay_verdict verdict)
 {
-    switch (verdict) {
-    case ASSAY_EQUIVALENT: return verdict_name(VERDICT_EQUIVALENT);
-    case ASSAY_DIFFERENT: return verdict_name(VERDICT_DIFFERENT);
-    case ASSAY_INCONCLUSIVE: return verdict_name(VERDICT_INCONCLUSIVE);
-    case ASSAY_NOTHING_FOUND: return verdict_name(VERDICT_NOTHING_FOUND);
-    }
-    return "?";
+    return (size_t)verdict < NUM_VERDICTS ? verdict_name(verdicts[verdict]) : "?";
 }
 
 void assay_options_init(struct assay_options *options, size_t size)

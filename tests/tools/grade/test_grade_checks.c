@@ -146,7 +146,7 @@ static struct result run_check_timed(struct rubric *r, const struct submitted_im
         h->made[i].cpu_s = cpu_s != NULL ? cpu_s[i] : 0;
         a->of[0][i].m = a->of[0][i].noise = reference;
     }
-    MUST(grade_checks_run(r, &r->check[0], a, 0, h, alpha, &out, &e));
+    MUST(grade_checks_run(&(struct grading){r, a, h, alpha, NULL}, &r->check[0], 0, &out, &e));
     for (int i = 0; i < r->num_images; i++)
         submitted_image_free(&h->image[i]);
     free(r);
@@ -196,7 +196,7 @@ static struct result buy(const struct bug *bug, double noise, int *runs)
     h->image[0] = submit_render(&noisy, SPP);
     double spp = h->image[0].spp = SPP;
     for (*runs = 1;; ++*runs) {
-        MUST(grade_checks_run(r, &r->check[0], a, 0, h, 1e-5, &out, &e));
+        MUST(grade_checks_run(&(struct grading){r, a, h, 1e-5, NULL}, &r->check[0], 0, &out, &e));
         if (out.more == 0 || *runs == 20)
             break;
         result_free(&out);
@@ -516,7 +516,7 @@ TEST(what_is_accepted_costs_nothing_and_hides_nothing)
         int set = -1;
         assert_non_null(h);
         h->image[0] = submit_render(&cases[k].bug, SPP);
-        MUST(grade_all_checks(r, a, h, 1e-5, &out, &set, &e));
+        MUST(grade_all_checks(&(struct grading){r, a, h, 1e-5, NULL}, &out, &set, &e));
         if (set != cases[k].set || out.share != cases[k].share)
             fail_msg("case %zu: set %d, %g of the points: %s", k, set, out.share, out.seen);
         assert_string_equal(out.accepted, set == 1 ? "bright" : "");

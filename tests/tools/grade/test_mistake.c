@@ -32,7 +32,8 @@ static bool is_passed(const struct rubric_check *c)
 {
     struct result result;
     struct err e;
-    MUST(grade_checks_run(of.rubric, c, of.answers, 0, right, 1e-5, &result, &e));
+    MUST(grade_checks_run(&(struct grading){of.rubric, of.answers, right, 1e-5, NULL}, c, 0,
+                          &result, &e));
     bool passed = result.share == 1;
     result_free(&result);
     return passed;
@@ -68,10 +69,11 @@ static struct outcome grade(struct submitted_images *h)
     struct outcome v;
     struct err e;
     int set;
-    MUST(grade_all_checks(of.rubric, of.answers, h, 1e-5, result, &set, &e));
+    const struct grading g = {of.rubric, of.answers, h, 1e-5, &of.bugs};
+    MUST(grade_all_checks(&g, result, &set, &e));
     for (int i = 0; i < of.rubric->num_checks; i++)
         v.plain[i] = result[i].share;
-    MUST(mistake_judge(of.rubric, of.answers, &of.bugs, h, 1e-5, &set, result, &v.mistake, &e));
+    MUST(mistake_judge(&g, &set, result, &v.mistake, &e));
     for (int i = 0; i < of.rubric->num_checks; i++) {
         v.share[i] = result[i].share;
         if (v.share[i] > v.plain[i] && result[i].carried[0] == '\0')

@@ -26,8 +26,8 @@ static struct diagnosis find(int set, int bug, int second, double noise, int gra
     struct submitted_images *h = bug_images_hand_in(&of, set, bug, second, noise);
     struct diagnosis found;
     struct err e;
-    MUST(rubric_bugs_diagnose(&of.bugs, of.rubric, of.answers, h, graded, 1e-5, without, &found,
-                              with, &e));
+    MUST(rubric_bugs_diagnose(&(struct grading){of.rubric, of.answers, h, 1e-5, &of.bugs}, graded,
+                              without, &found, with, &e));
     bug_images_take_back(&of, h);
     return found;
 }
@@ -87,8 +87,9 @@ TEST(masked_images_have_names)
         struct submitted_images *h = bug_images_hand_in(&masked, 0, bug, -1, 1);
         struct diagnosis found;
         struct err e;
-        MUST(rubric_bugs_diagnose(&masked.bugs, masked.rubric, masked.answers, h, 0, 1e-5, NULL,
-                                  &found, &with, &e));
+        MUST(rubric_bugs_diagnose(
+            &(struct grading){masked.rubric, masked.answers, h, 1e-5, &masked.bugs}, 0, NULL,
+            &found, &with, &e));
         bug_images_take_back(&masked, h);
         if (found.num_named != 1 || found.candidate[0].bug != bug)
             fail_msg("%s: %d named", known[i], found.num_named);
