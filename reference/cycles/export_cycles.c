@@ -7,8 +7,6 @@
 
 #include <assert.h>
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
 #include <unistd.h>
 
 enum { MAX_DEPTH = 1025 }; /* Blender's limit of 1024 bounces is one less than ours */

@@ -377,8 +377,7 @@ bool export_mitsuba(const struct scene *s, const struct camera *c, int depth, co
     if (dot != NULL && (slash == NULL || dot > slash + 1))
         *dot = '\0';
     struct mitsuba_xml xml;
-    struct writer w = {
-        .xml = &xml, .s = s, .c = c, .stem = stem.s, .base = slash != NULL ? slash + 1 : stem.s};
+    struct writer w = {.xml = &xml, .s = s, .c = c, .stem = stem.s, .base = fs_base(stem.s)};
     if (!features_check_exportable("Mitsuba", s, c, e) || !check_filter(&c->filter, e))
         return false;
     bool ok = mitsuba_new(&xml, e) && put_scene(&w, depth, e) && mitsuba_write(&xml, path, e);

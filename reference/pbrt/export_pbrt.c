@@ -264,9 +264,7 @@ static bool put_sky_image(const struct writer *w, uint32_t rows, struct err *e)
         }
     bool ok = image_write_exr(name.s, &im, e);
     image_free(&im);
-    slash = strrchr(name.s, '/');
-    fprintf(w->f, "LightSource \"infinite\" \"string filename\" [\"%s\"]\n",
-            slash != NULL ? slash + 1 : name.s);
+    fprintf(w->f, "LightSource \"infinite\" \"string filename\" [\"%s\"]\n", fs_base(name.s));
     return ok;
 }
 

@@ -48,18 +48,17 @@ static bool join_names(const char *const *keep, char *out, size_t size, struct e
 static void read_report(const char *out, const struct sandbox_job *job, bool killed, bool no_memory,
                         const struct err *last, struct sandbox_result *r)
 {
-    char path[MAX_PATH], word[16] = "";
-    snprintf(path, sizeof path, "%s/.report", out);
-    FILE *f = fopen(path, "r");
+    const struct path report = fs_path("%s/.report", out), memory = fs_path("%s/.memory", out);
+    char word[16] = "";
+    FILE *f = fopen(report.s, "r");
     long ticks = 0;
     bool known = f != NULL && fscanf(f, "%9d %15s %18ld", &r->status, word, &ticks) >= 2 && !killed;
     if (ticks > 0)
         r->cpu_s = (double)ticks / (double)sysconf(_SC_CLK_TCK);
     if (f != NULL)
         fclose(f);
-    unlink(path);
-    snprintf(path, sizeof path, "%s/.memory", out);
-    unlink(path);
+    unlink(report.s);
+    unlink(memory.s);
     if (no_memory && (!known || r->status != 0))
         sandbox_conclude(job, "memory", last, r);
     else
@@ -69,16 +68,15 @@ static void read_report(const char *out, const struct sandbox_job *job, bool kil
 /* Files that are too large are no output. */
 static void drop_large(const char *out, const struct sandbox_job *job)
 {
-    char path[MAX_PATH];
+    const struct path tree = fs_path("%s/tree.tar", out);
     struct stat st;
     for (const char *const *name = job->keep; name != NULL && *name != NULL; name++) {
-        snprintf(path, sizeof path, "%s/%s", out, *name);
-        if (lstat(path, &st) == 0 && (size_t)st.st_size > job->limit.file)
-            unlink(path);
+        const struct path path = fs_path("%s/%s", out, *name);
+        if (lstat(path.s, &st) == 0 && (size_t)st.st_size > job->limit.file)
+            unlink(path.s);
     }
-    snprintf(path, sizeof path, "%s/tree.tar", out);
-    if (job->keep_tree && lstat(path, &st) == 0 && (size_t)st.st_size > job->limit.disk)
-        unlink(path);
+    if (job->keep_tree && lstat(tree.s, &st) == 0 && (size_t)st.st_size > job->limit.disk)
+        unlink(tree.s);
 }
 
 /* A directory that what runs in the sandbox may write. */

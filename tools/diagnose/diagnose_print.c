@@ -1,5 +1,7 @@
 #include "diagnose_print.h"
 
+#include "reference/base/json_node.h"
+
 #include <math.h>
 
 #define LN10 2.302585092994046
@@ -107,12 +109,6 @@ void diagnose_print(FILE *f, const struct catalogue *c, const struct observation
                 json_string_value(json_object_get(s, "reason")));
 }
 
-/* null where there is no number: nothing could be explained, or p underflows. */
-static json_t *number(double v)
-{
-    return isfinite(v) ? json_real(v) : json_null();
-}
-
 static json_t *view_json(const struct catalogue *c, const struct observation *clue,
                          const struct candidate *best)
 {
@@ -122,9 +118,9 @@ static json_t *view_json(const struct catalogue *c, const struct observation *cl
                          ? json_pack("{si,si,si,si,sf}", "x", cell * v.x, "y", cell * v.y, "width",
                                      cell * v.columns, "height", cell * v.rows, "change", v.change)
                          : json_null();
-    return json_pack("{ss,so,so,so,so}", "view", clue->view->name, "t", number(v.t), "log10_lead",
-                     number(log10_of(v.log_lead)), "explained", number(v.explained), "region",
-                     region);
+    return json_pack("{ss,so,so,so,so}", "view", clue->view->name, "t", json_finite(v.t),
+                     "log10_lead", json_finite(log10_of(v.log_lead)), "explained",
+                     json_finite(v.explained), "region", region);
 }
 
 json_t *diagnose_print_json(const struct catalogue *c, const struct observation *clue,
@@ -138,11 +134,11 @@ json_t *diagnose_print_json(const struct catalogue *c, const struct observation 
     for (int i = 0; i < d->num_candidates; i++) {
         const struct candidate *k = &d->candidate[i];
         const struct bug *b = &c->bug[k->bug];
-        json_array_append_new(candidates,
-                              json_pack("{ss,ss,ss,so,so,so}", "name", b->name, "bug", b->what,
-                                        "where", b->where, "amplitude", number(k->amplitude),
-                                        "log10_likelihood", number(log10_of(k->log_likelihood)),
-                                        "explained", number(k->explained)));
+        json_array_append_new(candidates, json_pack("{ss,ss,ss,so,so,so}", "name", b->name, "bug",
+                                                    b->what, "where", b->where, "amplitude",
+                                                    json_finite(k->amplitude), "log10_likelihood",
+                                                    json_finite(log10_of(k->log_likelihood)),
+                                                    "explained", json_finite(k->explained)));
     }
     for (int i = 0; i < num_clues; i++)
         json_array_append_new(views, d->num_candidates > 0
@@ -150,9 +146,9 @@ json_t *diagnose_print_json(const struct catalogue *c, const struct observation 
                                          : json_pack("{ss}", "view", clue[i].view->name));
     json_t *root =
         json_pack("{ss,ss,so,si,so,so,so,sO}", "finding", finding[d->finding], "gate", d->gate,
-                  "log10_p", number(d->log10_p), "known_bugs", c->num_bugs, "named", named,
+                  "log10_p", json_finite(d->log10_p), "known_bugs", c->num_bugs, "named", named,
                   "candidates", candidates, "views", views, "skipped", skipped);
     if (root != NULL && d->finding == FINDING_BUG)
-        json_object_set_new(root, "probability", number(d->probability));
+        json_object_set_new(root, "probability", json_finite(d->probability));
     return root;
 }

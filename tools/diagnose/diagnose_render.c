@@ -4,9 +4,7 @@
 #include "reference/replicates/engine_driver.h"
 #include "tools/validate/run_pathtracer.h"
 
-#include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 #include <unistd.h>
 
 enum { FEWEST_CONSISTENT = 4 };

@@ -4,7 +4,6 @@
 #include "carried_ratio.h"
 
 #include <stdio.h>
-#include <string.h>
 
 /* A bug on top of deviations that were not recognised, as it spoils all images that show them. */
 static bool grade_with(const struct grading *g, int set, struct result *result, struct err *e)

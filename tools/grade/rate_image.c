@@ -4,7 +4,6 @@
 #include "tools/images/image_file.h"
 
 #include <math.h>
-#include <stdlib.h>
 
 /* A step of one batch moves one of the colours by 510 batch/most codes. */
 enum { MOST_BATCHES = 64 };

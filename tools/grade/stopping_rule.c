@@ -184,14 +184,6 @@ enum stopping_kind stopping_rule_of(const char *bug)
     return STOPS_RIGHTLY;
 }
 
-static double luminance_of(const double *px)
-{
-    double sum = 0;
-    for (size_t c = 0; c < 3; c++)
-        sum += luminance_weight[c] * px[c];
-    return sum;
-}
-
 /* Of each tile: the luminance of s over that of m, both cut off where codes end. */
 static void light_of(const struct submitted_image *s, const struct moments *m, double *light)
 {
@@ -202,8 +194,8 @@ static void light_of(const struct submitted_image *s, const struct moments *m, d
             int x = t % columns * RUBRIC_TILE + i % RUBRIC_TILE,
                 y = t / columns * RUBRIC_TILE + i / RUBRIC_TILE;
             size_t p = 3 * ((size_t)y * (size_t)s->width + (size_t)x);
-            a += fmin(luminance_of(s->mean + p), s->clip);
-            b += fmin(luminance_of(m->mean + p), s->clip);
+            a += fmin(submitted_image_luminance(s->mean + p), s->clip);
+            b += fmin(submitted_image_luminance(m->mean + p), s->clip);
         }
         light[t] = a > 0 && b > 0 ? a / b : 1;
     }

@@ -149,7 +149,7 @@ static int neighbours(const struct submitted_image *s, size_t p, size_t at[9])
     return num;
 }
 
-static double luminance_of(const double *px)
+double submitted_image_luminance(const double px[3])
 {
     return luminance_weight[0] * px[0] + luminance_weight[1] * px[1] + luminance_weight[2] * px[2];
 }
@@ -166,7 +166,8 @@ static void measure_runs(struct submitted_image *s)
             double w = s->run[k].spp / s->spp / s->runs_dof;
             for (size_t c = 0; c < 3; c++)
                 s->measured[4 * p + c] += w * pow(x[c] - mean[c], 2);
-            s->measured[4 * p + 3] += w * pow(luminance_of(x) - luminance_of(mean), 2);
+            s->measured[4 * p + 3] +=
+                w * pow(submitted_image_luminance(x) - submitted_image_luminance(mean), 2);
         }
 }
 

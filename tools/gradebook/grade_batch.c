@@ -37,19 +37,13 @@ static bool key_of(const struct grade_job *job, const struct submission *s, char
     return true;
 }
 
-/* JSON has no NaN. */
-static json_t *number(double v)
-{
-    return isfinite(v) ? json_real(v) : json_null();
-}
-
 static json_t *relative_of(const struct difference *a, const struct rubric_image *p)
 {
     if (a->relative == NULL)
         return json_null();
     json_t *array = json_array();
     for (int i = 0; i < p->width / RUBRIC_TILE * (p->height / RUBRIC_TILE); i++)
-        json_array_append_new(array, number(a->relative[i]));
+        json_array_append_new(array, json_finite(a->relative[i]));
     return array;
 }
 

@@ -5,7 +5,6 @@
 
 #include <math.h>
 #include <stdio.h>
-#include <string.h>
 
 static const double told = 0.005; /* a point is written with two decimals */
 

@@ -3,7 +3,6 @@
 #include "reference/base/json_node.h"
 #include "tools/base/text.h"
 
-#include <stdio.h>
 #include <string.h>
 
 static const struct {

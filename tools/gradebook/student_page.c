@@ -9,7 +9,6 @@
 #include "tools/html/html.h"
 #include "tools/results/results.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 struct page {

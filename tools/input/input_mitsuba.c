@@ -11,7 +11,6 @@
 
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* ITU-R BT.709 to CIE XYZ, with the digits that Mitsuba uses. */

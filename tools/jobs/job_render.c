@@ -10,7 +10,6 @@
 
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
 /* Every job says these itself. */
 static const struct option_words cells_and_threads[] = {{"-p", 4}, {"--cell", 4}, {0}};

@@ -9,7 +9,6 @@
 
 #include <errno.h>
 #include <limits.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -92,10 +91,9 @@ bool plan_begin(struct plan *p, const char *output, const char *product, int cpu
 static bool add_program(struct plan *p, const char *program, struct err *e)
 {
     struct path module;
-    const char *slash = strrchr(program, '/');
     if (!plan_input(p, program, e))
         return false;
-    return strcmp(slash != NULL ? slash + 1 : program, "assay") != 0 ||
+    return strcmp(fs_base(program), "assay") != 0 ||
            (image_oiio_file(&module, e) && plan_input(p, module.s, e));
 }
 

@@ -6,7 +6,6 @@
 
 #include <errno.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 #include <sys/stat.h>
@@ -21,9 +20,7 @@ enum { NUM_ENDINGS = sizeof endings / sizeof *endings };
 
 static bool stage_file(const char *from, const char *dir, struct err *e)
 {
-    char to[2 * MAX_PATH];
-    snprintf(to, sizeof to, "%.4000s/%.4000s", dir, fs_base(from));
-    return fs_copy(from, to, e);
+    return fs_copy(from, fs_path("%s/%s", dir, fs_base(from)).s, e);
 }
 
 bool submission_stage(const struct rubric *r, const char *dir, struct err *e)
@@ -263,10 +260,9 @@ bool submission_open(const struct rubric *r, const char *path, const char *work,
 static bool move_file(const char *from_dir, const char *name, const char *to, bool *moved,
                       struct err *e)
 {
-    char from[2 * MAX_PATH];
-    snprintf(from, sizeof from, "%s/%s", from_dir, name);
-    *moved = access(from, R_OK) == 0;
-    return !*moved || fs_copy(from, to, e);
+    const struct path from = fs_path("%s/%s", from_dir, name);
+    *moved = access(from.s, R_OK) == 0;
+    return !*moved || fs_copy(from.s, to, e);
 }
 
 static bool run_program(const struct rubric *r, const struct sandbox *box,
