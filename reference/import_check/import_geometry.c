@@ -97,7 +97,7 @@ static bool weld(struct check *c, struct err *e)
     c->num_buckets = 2 * (uint32_t)corners;
     /* All as one block: the vertices, then lists of numbers. */
     c->vertex = malloc(corners * (sizeof *c->vertex + 6 * sizeof *c->next));
-    if (c->vertex == NULL)
+    if (c->vertex == NULL || c->num_buckets == 0)
         return err_set(e, "import check: out of memory");
     c->corner_vertex = (uint32_t *)(c->vertex + corners);
     c->next = c->corner_vertex + corners;

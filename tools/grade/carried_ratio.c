@@ -75,8 +75,9 @@ static double correlation(const double *u, const double *v, int columns, int row
 }
 
 /* Standard deviation over mean. */
-static double spread_of(const double *tile, size_t num)
+static double spread_of(const double *tile, int columns, int rows)
 {
+    size_t num = (size_t)columns * (size_t)rows;
     double mean = gsl_stats_mean(tile, 1, num);
     return mean > 0 ? gsl_stats_sd_with_fixed_mean(tile, 1, num, mean) / mean : INFINITY;
 }
@@ -91,8 +92,8 @@ static bool is_like(const struct submitted_image *s, const struct moments *m, bo
            *ours = tiles_of(m->mean, s->width, s->height, s->clip);
     bool ok = (theirs != NULL && ours != NULL) || err_set(e, "out of memory");
     *is = ok && (correlation(theirs, ours, columns, rows) >= least ||
-                 (even_too && spread_of(ours, (size_t)(columns * rows)) < even &&
-                  spread_of(theirs, (size_t)(columns * rows)) < noisy));
+                 (even_too && spread_of(ours, columns, rows) < even &&
+                  spread_of(theirs, columns, rows) < noisy));
     free(theirs);
     free(ours);
     return ok;
