@@ -62,6 +62,8 @@ struct sweep {
     struct part *part,
         *tiles;     /* chi_square.h: of the largest band, and of the tiles; room for them twice */
     double squared; /* squared_bias() */
+    struct matched_filter directed;
+    double *root[2]; /* which that knows of the band; NULL */
 };
 
 /* Beyond that z the smallest log10 p is all that is known. */
@@ -130,7 +132,10 @@ static bool sweep_band(const struct judge *j, const struct moments *a, const str
                        int y, struct sweep *s, struct comparison *out, struct err *e)
 {
     struct pyramid *p = &s->band;
-    if (!pyramid_rebuild(a, b, s->channel, j->opt.tile, p, e))
+    const bool directed = s->channel == CHANNEL_LUMINANCE && s->root[0] != NULL;
+    if (directed)
+        matched_filter_add(j, &s->directed, y, a->height, s->root);
+    if (!pyramid_rebuild(a, b, s->channel, directed ? s->root : NULL, j->opt.tile, p, e))
         return false;
     for (int l = p->tile_level - 1; l >= 0; l--)
         scan(j, p, l, y, l, s);
@@ -260,18 +265,33 @@ static void fill_statistics(struct judge *j, const struct worst worst[2],
 }
 
 /* The statistics besides those of the regions. */
-static bool test_rest(const struct moments *a, const struct moments *b, struct judge *j,
-                      enum error_mode_kind *like, double *directed, double *noise,
-                      struct comparison *out, struct err *e)
+static void test_rest(const struct moments *a, const struct moments *b, struct judge *j,
+                      const struct sweep *s, enum error_mode_kind *like, double *directed,
+                      double *noise, struct comparison *out)
 {
     bool testable;
     *directed = 0;
     *like = 0;
-    if (j->share[STATISTIC_MATCHED_FILTER] > 0 && !matched_filter_test(a, b, j, like, directed, e))
-        return false;
+    if (j->share[STATISTIC_MATCHED_FILTER] > 0)
+        matched_filter_test(j, &s->directed, like, directed);
     out->variance = variance_ratio_test(a, b, j, noise, &testable);
     j->num_tests[STATISTIC_VARIANCE] = j->share[STATISTIC_VARIANCE] > 0 && testable;
-    return true;
+}
+
+/* What a sweep needs for all of them, of an image of such levels. */
+static bool open_sweep(const struct judge *j, const struct moments *a, const struct moments *b,
+                       const struct pyramid *levels, struct sweep *s, struct err *e)
+{
+    const struct pyramid_level *tile = &levels->level[levels->tile_level];
+    const size_t band = (size_t)a->width * (size_t)last_band(a->height, pyramid_band(levels));
+    s->tiles = malloc(2 * (size_t)tile->nx * (size_t)tile->ny * sizeof *s->tiles);
+    s->part = malloc(2 * band * sizeof *s->part);
+    const bool is_directed = j->share[STATISTIC_MATCHED_FILTER] > 0;
+    if (is_directed && (s->root[0] = malloc(2 * band * sizeof *s->root[0])) != NULL)
+        s->root[1] = s->root[0] + band;
+    if (s->tiles == NULL || s->part == NULL || (is_directed && s->root[0] == NULL))
+        return err_set(e, "out of memory for the regions of %d x %d pixels", a->width, a->height);
+    return !is_directed || matched_filter_open(a, b, &s->directed, e);
 }
 
 /* How far below the level it is held to the smallest p of a statistic is; above 0: rejected. */
@@ -298,16 +318,9 @@ bool compare_moments(const struct moments *a, const struct moments *b,
         return false;
     struct rect whole = {0, 0, a->width, a->height};
     const struct pyramid levels = pyramid_levels(a->width, a->height, opt->tile);
-    const struct pyramid_level *tile = &levels.level[levels.tile_level];
     set_guards(&j, pyramid_regions(&levels));
-    const int rows = last_band(a->height, pyramid_band(&levels));
-    s.tiles = malloc(2 * (size_t)tile->nx * (size_t)tile->ny * sizeof *s.tiles);
-    s.part = malloc(2 * (size_t)a->width * (size_t)rows * sizeof *s.part);
-    if (s.tiles == NULL || s.part == NULL) {
-        err_set(e, "out of memory for the regions of %d x %d pixels", a->width, a->height);
-        goto done;
-    }
-    if (!image_alloc(&out->z, a->width, a->height, 1, (const char *const[]){"z"}, e) ||
+    if (!open_sweep(&j, a, b, &levels, &s, e) ||
+        !image_alloc(&out->z, a->width, a->height, 1, (const char *const[]){"z"}, e) ||
         !image_alloc(&out->relative, a->width, a->height, 1, (const char *const[]){"rel"}, e))
         goto done;
     for (s.channel = 0; s.channel < NUM_CHANNELS; s.channel++) {
@@ -319,8 +332,7 @@ bool compare_moments(const struct moments *a, const struct moments *b,
         if (s.channel < CHANNEL_LUMINANCE)
             squared += luminance_weight[s.channel] * s.squared;
     }
-    if (!test_rest(a, b, &j, &like, &directed, &noise, out, e))
-        goto done;
+    test_rest(a, b, &j, &s, &like, &directed, &noise, out);
     fill_statistics(&j, worst, &dense, like, directed, noise, out);
     if (!fill_tiles(&j, &s.above, out, &tiles, e))
         goto done;
@@ -349,6 +361,8 @@ done:
     free(tiles);
     free(s.tiles);
     free(s.part);
+    free(s.root[0]);
+    matched_filter_free(&s.directed);
     pyramid_free(&s.band);
     pyramid_free(&s.above);
     if (!ok)

@@ -5,13 +5,6 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* sums over pixels p and channels c with weights w = d/v */
-struct sums {
-    struct cell cell; /* w A and w B, as if they were a region */
-    double unit;      /* |w| unit of B */
-    double size;      /* |w| max(A, B) */
-};
-
 /* What some neighbouring pixels add to them. */
 enum { CHUNK = 64 };
 struct chunk {
@@ -60,7 +53,7 @@ ISA_CLONES static void weigh(const struct error_modes_frame *f, int side, size_t
 /* Pixels x .. x+num-1 of row y. */
 ISA_CLONES static void add_chunk(const struct judge *j, const struct error_modes *modes, int x,
                                  int y, size_t num, const struct error_change *change,
-                                 struct sums *sums)
+                                 struct matched_sums *sums)
 {
     const struct error_modes_frame *f = &modes->own;
     const size_t at = error_modes_at(f, x, y);
@@ -79,7 +72,7 @@ ISA_CLONES static void add_chunk(const struct judge *j, const struct error_modes
     }
     weigh(f, 0, at, num, &t);
     weigh(f, 1, at, num, &t);
-    struct sums s = *sums;
+    struct matched_sums s = *sums;
     for (size_t i = 0; i < num; i++) {
         for (size_t c = 0; c < 3; c++) {
             s.unit += t.unit[c][i];
@@ -97,47 +90,72 @@ ISA_CLONES static void add_chunk(const struct judge *j, const struct error_modes
     *sums = s;
 }
 
-static void sum_up(const struct judge *j, struct error_modes *modes,
-                   const struct error_change *change, struct sums s[NUM_ERROR_MODES])
+bool matched_filter_open(const struct moments *a, const struct moments *b,
+                         struct matched_filter *out, struct err *e)
 {
-    for (int top = 0; top < modes->height; top += ERROR_MODES_BAND) {
-        const int left = modes->height - top;
-        const int rows = left < ERROR_MODES_BAND ? left : ERROR_MODES_BAND;
-        error_modes_go_to(modes, top, rows);
-        for (int y = top; y < top + rows; y++)
-            for (int k = 0; k < NUM_ERROR_MODES; k++) {
-                if (!error_mode_applies(modes, k))
-                    continue;
-                error_mode_row(modes, k, y, change);
-                for (int x = 0; x < modes->width; x += CHUNK) {
-                    const int rest = modes->width - x, num = rest < CHUNK ? rest : CHUNK;
-                    add_chunk(j, modes, x, y, (size_t)num, change, &s[k]);
-                }
+    *out = (struct matched_filter){.row = malloc(4 * (size_t)a->width * sizeof *out->row)};
+    if (out->row == NULL)
+        return err_set(e, "out of memory for %d pixels", a->width);
+    if (error_modes_open(a, b, &out->modes, e))
+        return true;
+    matched_filter_free(out);
+    return false;
+}
+
+void matched_filter_free(struct matched_filter *f)
+{
+    error_modes_free(&f->modes);
+    free(f->row);
+    *f = (struct matched_filter){.row = NULL};
+}
+
+/* Rows to which the directions have gone. */
+static void add_row(const struct judge *j, struct matched_filter *f, int y)
+{
+    const size_t width = (size_t)f->modes.width;
+    double *row = f->row;
+    const struct error_change change = {{row, row + width, row + 2 * width}, row + 3 * width};
+    for (int k = 0; k < NUM_ERROR_MODES; k++) {
+        if (!error_mode_applies(&f->modes, k))
+            continue;
+        error_mode_row(&f->modes, k, y, &change);
+        for (int x = 0; x < f->modes.width; x += CHUNK) {
+            const int rest = f->modes.width - x, num = rest < CHUNK ? rest : CHUNK;
+            add_chunk(j, &f->modes, x, y, (size_t)num, &change, &f->sums[k]);
+        }
+    }
+}
+
+void matched_filter_add(const struct judge *j, struct matched_filter *f, int y, int rows,
+                        double *const root[2])
+{
+    const struct error_modes_frame *own = &f->modes.own;
+    const int width = f->modes.width, end = y + rows;
+    for (int i = 0; y < end; y++, i += width) {
+        if (i / width % ERROR_MODES_BAND == 0)
+            error_modes_go_to(&f->modes, y,
+                              end - y < ERROR_MODES_BAND ? end - y : ERROR_MODES_BAND);
+        add_row(j, f, y);
+        for (int side = 0; side < 2; side++)
+            for (int x = 0; x < width; x++) {
+                const double *of = own->root[side] + error_modes_at(own, x, y);
+                root[side][i + x] = 0;
+                for (size_t c = 0; c < 3; c++)
+                    root[side][i + x] += luminance_weight[c] * of[c * own->room];
             }
     }
 }
 
-bool matched_filter_test(const struct moments *a, const struct moments *b, struct judge *j,
-                         enum error_mode_kind *found, double *log10_p, struct err *e)
+void matched_filter_test(struct judge *j, const struct matched_filter *f,
+                         enum error_mode_kind *found, double *log10_p)
 {
-    struct error_modes modes;
-    struct sums s[NUM_ERROR_MODES] = {{.unit = 0}};
     *found = 0;
     *log10_p = 0;
-    if (!error_modes_open(a, b, &modes, e))
-        return false;
-    const size_t width = (size_t)a->width;
-    double *row = malloc(4 * width * sizeof *row);
-    const struct error_change change = {{row, row + width, row + 2 * width}, row + 3 * width};
-    if (row == NULL) {
-        error_modes_free(&modes);
-        return err_set(e, "out of memory for %d pixels", a->width);
-    }
-    sum_up(j, &modes, &change, s);
     for (int k = 0; k < NUM_ERROR_MODES; k++) {
-        if (!error_mode_applies(&modes, k))
+        const struct matched_sums *s = &f->sums[k];
+        if (!error_mode_applies(&f->modes, k))
             continue;
-        struct measured m = region_measure_weighted(j, &s[k].cell, s[k].unit, s[k].size);
+        struct measured m = region_measure_weighted(j, &s->cell, s->unit, s->size);
         if (m.noise_free || !region_is_normal(j, &m))
             continue;
         j->num_tests[STATISTIC_MATCHED_FILTER]++;
@@ -147,7 +165,4 @@ bool matched_filter_test(const struct moments *a, const struct moments *b, struc
             *found = k;
         }
     }
-    free(row);
-    error_modes_free(&modes);
-    return true;
 }

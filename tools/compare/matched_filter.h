@@ -5,10 +5,31 @@
 #include "error_modes.h"
 #include "region.h"
 
-/* All directions that apply to this size of image. Counts its tests in j->num_tests. *found is the
- * direction of the smallest p, *log10_p (0 if none could be tested). Fails only out of memory. */
-bool matched_filter_test(const struct moments *a, const struct moments *b, struct judge *j,
-                         enum error_mode_kind *found, double *log10_p, struct err *e)
+/* Sums over pixels and channels with weights w = d/v. */
+struct matched_sums {
+    struct cell cell; /* w A and w B, as if they were a region */
+    double unit;      /* |w| unit of B */
+    double size;      /* |w| max(A, B) */
+};
+struct matched_filter {
+    struct error_modes modes;
+    double *row; /* a change of one row */
+    struct matched_sums sums[NUM_ERROR_MODES];
+};
+
+/* Fails only out of memory. Release with matched_filter_free(). */
+bool matched_filter_open(const struct moments *a, const struct moments *b,
+                         struct matched_filter *out, struct err *e)
     __attribute__((warn_unused_result));
+void matched_filter_free(struct matched_filter *f);
+
+/* Rows y .. y+rows-1, which follow those before. root[i] gets, of A's and B's pixels, what pyramid_rebuild() wants. */
+void matched_filter_add(const struct judge *j, struct matched_filter *f, int y, int rows,
+                        double *const root[2]);
+
+/* All directions that apply to this size of image, after all rows. Counts its tests in j->num_tests. *found is the direction of
+ * the smallest p, *log10_p (0 if none could be tested). */
+void matched_filter_test(struct judge *j, const struct matched_filter *f,
+                         enum error_mode_kind *found, double *log10_p);
 
 #endif

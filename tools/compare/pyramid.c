@@ -19,8 +19,9 @@ struct run {
     double var_v[RUN], var_v_normal[RUN], var_k3[RUN], tolerance[RUN];
 };
 
+/* root: see pyramid_rebuild(). */
 ISA_CLONES static void estimate(const struct moments *m, bool exact, int channel, size_t first,
-                                size_t num, struct run *r)
+                                size_t num, const double *root, struct run *r)
 {
     const bool luminance = channel == CHANNEL_LUMINANCE;
     for (size_t p = 0; p < num; p++) {
@@ -37,7 +38,7 @@ ISA_CLONES static void estimate(const struct moments *m, bool exact, int channel
             r->mean[p] += w * moments_mean(m, i);
             r->v[p] += w * (luminance ? sqrt(v) : v);
         }
-        for (size_t p = 0, i = 3 * first + c; p < num; p++, i += 3) {
+        for (size_t p = 0, i = 3 * first + c; root == NULL && p < num; p++, i += 3) {
             const double k3 = moments_m3(m, i) * r->k_scale[p];
             r->k3[p] += w * (luminance ? cbrt(k3) : k3);
         }
@@ -45,7 +46,7 @@ ISA_CLONES static void estimate(const struct moments *m, bool exact, int channel
             r->tolerance[p] += w * m->tolerance[i];
     }
     for (size_t p = 0; p < num; p++) {
-        const double v = r->v[p], k3 = r->k3[p];
+        const double v = r->v[p], k3 = root != NULL ? root[first + p] : r->k3[p];
         const struct estimate est = pyramid_estimate_from(r->mean[p], luminance ? v * v : v,
                                                           luminance ? k3 * k3 * k3 : k3, r->n[p]);
         r->v[p] = est.v;
@@ -72,7 +73,7 @@ struct estimate pyramid_pixel_estimate(const struct moments *m, size_t pixel, in
     struct run r;
     const bool exact = is_exact(m);
     assert(exact || moments_n(m, pixel) >= 3);
-    estimate(m, exact, channel, pixel, 1, &r);
+    estimate(m, exact, channel, pixel, 1, NULL, &r);
     return of_pixel(&r, 0);
 }
 
@@ -131,7 +132,7 @@ static bool one_value(const struct moments *m, size_t pixel, int channel)
 }
 
 static void fill_pixels(const struct moments *a, const struct moments *b, int channel,
-                        struct pyramid_level *level)
+                        double *const root[2], struct pyramid_level *level)
 {
     const size_t pixels = (size_t)level->nx * (size_t)level->ny;
     const bool exact_a = is_exact(a), exact_b = is_exact(b);
@@ -140,8 +141,8 @@ static void fill_pixels(const struct moments *a, const struct moments *b, int ch
     for (size_t p = 0; p < pixels; p++) {
         if (p % RUN == 0) {
             const size_t num = pixels - p < RUN ? pixels - p : RUN;
-            estimate(a, exact_a, channel, p, num, &run[0]);
-            estimate(b, exact_b, channel, p, num, &run[1]);
+            estimate(a, exact_a, channel, p, num, root != NULL ? root[0] : NULL, &run[0]);
+            estimate(b, exact_b, channel, p, num, root != NULL ? root[1] : NULL, &run[1]);
         }
         struct estimate ea = of_pixel(&run[0], p % RUN), eb = of_pixel(&run[1], p % RUN);
         level->cell[p] = (struct cell){0};
@@ -225,8 +226,8 @@ static bool alloc_cells(struct pyramid *p, struct pyramid old, struct err *e)
     return true;
 }
 
-bool pyramid_rebuild(const struct moments *a, const struct moments *b, int channel, int tile,
-                     struct pyramid *p, struct err *e)
+bool pyramid_rebuild(const struct moments *a, const struct moments *b, int channel,
+                     double *const root[2], int tile, struct pyramid *p, struct err *e)
 {
     assert(a->width == b->width && a->height == b->height);
     const struct pyramid old = *p;
@@ -235,7 +236,7 @@ bool pyramid_rebuild(const struct moments *a, const struct moments *b, int chann
         return false;
     for (int i = 0; i < p->num_levels; i++) {
         if (p->level[i].side == 1)
-            fill_pixels(a, b, channel, &p->level[i]);
+            fill_pixels(a, b, channel, root, &p->level[i]);
         else /* a tile that is no power of two is not made of the level below it */
             fill_from(p, i == p->tile_level ? 0 : i - 1, i);
     }
@@ -246,7 +247,7 @@ bool pyramid_build(const struct moments *a, const struct moments *b, int channel
                    struct pyramid *out, struct err *e)
 {
     *out = (struct pyramid){.width = 0};
-    return pyramid_rebuild(a, b, channel, tile, out, e);
+    return pyramid_rebuild(a, b, channel, NULL, tile, out, e);
 }
 
 int pyramid_band(const struct pyramid *levels)

@@ -80,9 +80,11 @@ struct pyramid pyramid_levels(int width, int height, int tile);
 /* Same sizes. Fails only out of memory. Release with pyramid_free(). */
 bool pyramid_build(const struct moments *a, const struct moments *b, int channel, int tile,
                    struct pyramid *out, struct err *e) __attribute__((warn_unused_result));
-/* The same in the memory of one that was built before, or is zero. */
-bool pyramid_rebuild(const struct moments *a, const struct moments *b, int channel, int tile,
-                     struct pyramid *p, struct err *e) __attribute__((warn_unused_result));
+/* The same in the memory of one that was built before, or is zero. root: of both sides' pixels, of luminance,
+ * sum w_c cbrt k3_c, which is most of the work, where that is known; NULL: not. */
+bool pyramid_rebuild(const struct moments *a, const struct moments *b, int channel,
+                     double *const root[2], int tile, struct pyramid *p, struct err *e)
+    __attribute__((warn_unused_result));
 void pyramid_free(struct pyramid *p);
 
 /* The same in two parts, in less memory. An image is cut from the top into bands of so many rows, the last of up to twice as

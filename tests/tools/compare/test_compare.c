@@ -166,7 +166,7 @@ TEST(test_pyramid_of_bands)
         for (int k = 0; k < bands; k++) {
             struct moments part =
                 moments_rows(&file, k * band, k + 1 < bands ? band : h - k * band);
-            MUST(pyramid_rebuild(&part, &part, 3, tile, &p, &e));
+            MUST(pyramid_rebuild(&part, &part, 3, NULL, tile, &p, &e));
             for (int l = 0; l < whole.num_levels && (bands == 1 || l < p.tile_level + 2); l++) {
                 const struct pyramid_level *level = &p.level[l];
                 size_t num = (size_t)level->nx * (size_t)level->ny,
