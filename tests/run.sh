@@ -1,5 +1,5 @@
 #!/bin/bash
-# tests/run.sh BUILD PROGRAM...: runs the test programs, the end-to-end tests, `make lint` and a fixed run of each fuzzer, and ends with the line
+# tests/run.sh BUILD PROGRAM...: runs the test programs and the scripts of tests/scripts.txt, and ends with the line
 # "N passed, N failed[, N skipped]". A program that dies, or that runs no test, counts as failed.
 set -u
 build=${1:?usage: tests/run.sh BUILD PROGRAM...}
@@ -10,74 +10,48 @@ log=$build/check
 rm -rf "$log"
 mkdir -p "$log"
 
-# cmocka's own lines: "[       OK ] name", "[  FAILED  ] name", "[  SKIPPED ] name".
-count() {
-    grep -c "^\[ *$1 *\] [a-z]" "$2"
-}
-
-# run_job LOG PROGRAM BUILD: its output, exit status and seconds into files, so that jobs may run side by
-# side. Test programs take no arguments; scripts take BUILD.
+# run_job LOG NAME COMMAND...: its output, exit status and CPU seconds into files, so that jobs may run side by side.
 run_job() {
-    local log=$1 name start=$SECONDS
-    name=$(basename "$2" .sh)
-    case $2 in
-    */fuzz.sh) tests/fuzz/run.sh -j 1 "$3" fixed ;;
-    *.sh) "$2" "$3" ;;
-    *) "$2" ;;
-    esac >"$log/$name.out" 2>&1
-    echo "$? $((SECONDS - start))" >"$log/$name.status"
+    local log=$1 name=$2 status
+    shift 2
+    "$@" >"$log/$name.out" 2>&1
+    status=$?
+    # The second line: user and system time of all children, as 1m2.345s.
+    times >"$log/$name.times"
+    echo "$status $(awk -F '[ms ]+' 'NR == 2 { printf "%d", 60 * ($1 + $3) + $2 + $4 }' "$log/$name.times")" >"$log/$name.status"
 }
 export -f run_job
 
-# The longest first: one more than there are processors at a time, since some wait for other programs.
+# The tests that are scripts, with the long programs among them, then the short ones: one job more than there are processors, since some
+# wait for other programs.
+scripts() { sed "s#PLAIN#${PLAIN_BUILD:-$build}#; s#BUILD#$build#; /^\#/d" tests/scripts.txt; }
+programs() { for p in "${programs[@]}"; do echo "$(basename "$p") $p"; done; }
+long='/test_(approve|calibration|cycles.*|embree|materials|povray.*|statistics|suite_scenes)$'
 {
-    echo tests/end_to_end/end_to_end.sh
-    echo tests/end_to_end/lint.sh
-    echo tests/end_to_end/docs.sh
-    echo tests/fuzz.sh
-    long='/test_(approve|calibration|cycles.*|embree|materials|povray.*|statistics|suite_scenes)$'
-    printf '%s\n' "${programs[@]}" | grep -E "$long"
-    printf '%s\n' "${programs[@]}" | grep -vE "$long"
-} | xargs -I{} -P "$(($(nproc) + 1))" bash -c 'run_job "$0" {} "$1"' "$log" "$build"
+    scripts | head -n 2
+    programs | grep -E "$long"
+    scripts | tail -n +3
+    programs | grep -vE "$long"
+} | xargs -L 1 -P "$(($(nproc) + 1))" bash -c 'run_job "$0" "$@"' "$log"
 
-for program in "${programs[@]}"; do
-    name=$(basename "$program")
+# Lines "ok ...", "not ok ..." and "skip ..."; of a test program cmocka's own: "[       OK ] name", "[  FAILED  ] name", "[  SKIPPED ] name",
+# which come twice where a test fails: only the first list is counted.
+for name in $({ programs && scripts; } | cut -d ' ' -f 1); do
     status=127 seconds=0
     read -r status seconds <"$log/$name.status"
-    # The lines carry the name twice where a test fails; only the first list is counted.
-    sed '/^\[==========\].* run\.$/q' "$log/$name.out" >"$log/$name.first"
-    p=$(count OK "$log/$name.first") f=$(count FAILED "$log/$name.first")
-    s=$(count SKIPPED "$log/$name.first")
+    sed -E '/^\[==========\].* run\.$/q; s/^\[ *OK *\] ([a-z])/ok \1/; s/^\[ *FAILED *\] ([a-z])/not ok \1/; s/^\[ *SKIPPED *\] ([a-z])/skip \1/' \
+        "$log/$name.out" >"$log/$name.results"
+    p=$(grep -c '^ok ' "$log/$name.results") f=$(grep -c '^not ok ' "$log/$name.results") s=$(grep -c '^skip ' "$log/$name.results")
     if [ "$status" -ne 0 ] && [ "$f" -eq 0 ] || [ $((p + f + s)) -eq 0 ]; then
         f=$((f + 1))
-        echo "$name: died with status $status"
+        echo "not ok died with status $status" | tee -a "$log/$name.results"
     fi
     if [ "$f" -gt 0 ]; then
         cat "$log/$name.out"
-        sed -n "s/^\[ *FAILED *\] \([a-z]\)/$name: \1/p" "$log/$name.first" >>"$log/failed"
-        grep -q "^$name: " "$log/failed" || echo "$name: died with status $status" >>"$log/failed"
+        sed -n "s/^not ok /$name: /p" "$log/$name.results" >>"$log/failed"
     fi
-    [ "$s" -gt 0 ] && grep -i "skip" "$log/$name.out"
-    printf '%-24s %3d passed, %d failed, %d skipped  (%d s)\n' "$name" "$p" "$f" "$s" "$seconds"
-    passed=$((passed + p)) failed=$((failed + f)) skipped=$((skipped + s))
-done
-
-# Lines "ok ...", "not ok ..." and "skip ...".
-for name in end_to_end lint docs fuzz; do
-    status=127 seconds=0
-    read -r status seconds <"$log/$name.status"
-    p=$(grep -c '^ok ' "$log/$name.out") f=$(grep -c '^not ok ' "$log/$name.out")
-    s=$(grep -c '^skip ' "$log/$name.out")
-    if [ "$status" -ne 0 ] && [ "$f" -eq 0 ] || [ $((p + f)) -eq 0 ]; then
-        f=$((f + 1))
-        echo "$name: died with status $status"
-    fi
-    if [ "$f" -gt 0 ]; then
-        cat "$log/$name.out"
-        grep '^not ok ' "$log/$name.out" >>"$log/failed" || echo "$name: died with status $status" >>"$log/failed"
-    fi
-    [ "$s" -gt 0 ] && grep '^skip ' "$log/$name.out"
-    printf '%-24s %3d passed, %d failed, %d skipped  (%d s)\n' "$name" "$p" "$f" "$s" "$seconds"
+    [ "$s" -gt 0 ] && grep -i '^skip\(ped:\)\? ' "$log/$name.out"
+    printf '%-24s %3d passed, %d failed, %d skipped  (%d CPU s)\n' "$name" "$p" "$f" "$s" "$seconds"
     passed=$((passed + p)) failed=$((failed + f)) skipped=$((skipped + s))
 done
 

@@ -13,19 +13,19 @@ rm -rf "$cov/profile" "$cov/log"
 mkdir -p "$cov/profile" "$cov/log"
 {
     # The longest first.
-    [ -z "${SKIP_END_TO_END:-}" ] && echo tests/end_to_end/end_to_end.sh
+    [ -z "${SKIP_END_TO_END:-}" ] && sed "/^#/d; /^lint\|^docs\|^fuzz/d; s#BUILD#$cov#; s#PLAIN#$build#" tests/scripts.txt
     long='/test_(approve|calibration|compare_rates|converge|cycles.*|statistics|suite_scenes)$'
     printf '%s\n' "$@" | grep -E "$long"
     printf '%s\n' "$@" | grep -vE "$long"
-} >"$cov/jobs"
+} | sed 's#^/.*/\(.*\)#\1 &#' >"$cov/jobs"
 # The end-to-end runs want two builds, what the benchmark and the browser need, and the version.
 ln -sfn . "$cov/san"
 ln -sfn "$build/browser" "$cov/browser"
 ln -sf "$build/tests/bench" "$cov/tests/bench"
 ln -sf "$build/commit" "$cov/commit"
 export PLAIN_BUILD=$build
-# A script takes BUILD, a test program nothing.
-xargs -P "$(nproc)" -I{} sh -c 'case $1 in *.sh) "$1" "$0" ;; *) "$1" ;; esac >"$0/log/$(basename "$1")" 2>&1' "$cov" {} <"$cov/jobs"
+# A name and a command each.
+xargs -P "$(nproc)" -L 1 sh -c 'name=$1; shift; "$@" >"$0/log/$name" 2>&1' "$cov" <"$cov/jobs"
 # What .ci/run adds: the other engines, live on one scene.
 if [ -z "${SKIP_END_TO_END:-}" ] && command -v blender >/dev/null && command -v povray >/dev/null; then
     "$cov/assay" validate -q --live --only 13_square_patch -o "$cov/live" >"$cov/log/live" 2>&1

@@ -16,17 +16,6 @@ ok() { tell "$1" ""; }
 not_ok() { tell "$1" "${2:-?}"; }
 what=""
 . tests/end_to_end/expect.sh
-# part SCRIPT ARGUMENT...: one that prints such lines too. To have looked at nothing, or not to the end, is a failure.
-part() {
-    local wrong status
-    "$@" >"$tmp/part"
-    status=$?
-    cat "$tmp/part"
-    wrong=$(grep -c '^not ok' "$tmp/part")
-    failures=$((failures + wrong))
-    grep -q '^ok \|^skip ' "$tmp/part" || not_ok "$1" "nothing was looked at"
-    [ $status -eq 0 ] || [ "$wrong" -gt 0 ] || not_ok "$1" "ended with status $status"
-}
 
 scene=reference/scenes/41_cornell.dae
 small="-r 32 32 -s 16 -t 2 -q"
@@ -102,8 +91,6 @@ if tests/mutants/mutants.sh --quick "$plain" >"$tmp/mutants.out" 2>&1; then ok "
     not_ok "three mutants are caught" "$(cat "$tmp/mutants.out")"
 fi
 rm -f "$tmp/mutants.out"
-# Those made by machine: what the mutator makes, and who finds planted ones.
-tests/mutants/machine/check.py "$plain" || not_ok "mutants by machine" "check.py ended early"
 
 # A directory that goes while its image is rendered: the image is saved in the current one.
 mkdir "$tmp/gone" "$tmp/here"
@@ -780,39 +767,7 @@ fi
 expect "grade: references alone" 0 "references of .*quick.rubric" "$assay" grade --prepare -o "$tmp/prepared" "$tmp/quick.rubric"
 expect "grade: which are there" 0 "[.]exr" ls "$tmp/prepared/.references"
 expect "grade: references and no submission" 3 "takes no submissions" "$san_assay" grade --prepare tools/rubrics/template.rubric x
-part tests/end_to_end/grading.sh "$build"
-part tests/end_to_end/source.sh "$build"
-part tests/end_to_end/autograder.sh "$build"
-part tests/end_to_end/library.sh "$plain"
-part tests/end_to_end/own_suite.sh "$plain"
-part tests/end_to_end/engines.sh "$plain"
-part tests/end_to_end/packaging.sh "$plain"
-part tests/end_to_end/peers.sh
 expect "grade: without bubblewrap it refuses" 3 "unsafe-no-sandbox" env PATH=/nowhere "$assay" grade -o "$tmp/x" "$tmp/quick.rubric" "$tmp/subs/right"
-
-# The same bits on any number of threads.
-part tests/end_to_end/threads.sh "$pathtracer"
-
-# Images made again from what they say of themselves.
-part tests/end_to_end/reproduce.sh "$build"
-
-# What a file or a command line may ask for.
-part tests/end_to_end/limits.sh "$build"
-
-# Verbs, and ways through them, that nothing above takes.
-part tests/end_to_end/verbs.sh "$build"
-part tests/end_to_end/pairs.sh "$plain"
-
-# The same work in jobs.
-part tests/studies/scale/scale.sh "$build"
-part tests/studies/scale/scale_reference.sh "$build"
-
-# Kills, full disks and missing memory.
-part tests/end_to_end/faults.sh "$build" 2
-part tests/end_to_end/no_memory.sh "$build"
-
-# The page, in a browser.
-part tests/browser/run.sh "$build"
 
 # Installed elsewhere, it needs nothing of the checkout.
 if make -s BUILD="$plain" PREFIX="$tmp/usr" install >"$tmp/out" 2>&1; then ok "make install"; else

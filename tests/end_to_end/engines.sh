@@ -7,6 +7,7 @@ tmp=$(mktemp -d) top=$PWD
 trap 'rm -rf "$tmp"' EXIT
 failures=0
 what="engines"
+export PYTHONDONTWRITEBYTECODE=1 # what is imported lies in the checkout, which may be installed
 . tests/end_to_end/expect.sh
 PATH=$build:/usr/bin:$PATH
 driver=$top/reference/engines/c-ray.py

@@ -1,8 +1,8 @@
 #!/bin/bash
-# tests/browser/run.sh BUILD: makes pages and looks at them in chromium. Prints "ok NAME" or "not ok NAME";
+# tests/browser/browser.sh BUILD: makes pages and looks at them in chromium. Prints "ok NAME" or "not ok NAME";
 # screenshots go into BUILD/browser/shots.
 set -u
-build=$(realpath "${1:?usage: tests/browser/run.sh BUILD}")
+build=$(realpath "${1:?usage: tests/browser/browser.sh BUILD}")
 here=$(dirname "$0")
 tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT
