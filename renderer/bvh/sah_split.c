@@ -45,19 +45,25 @@ static void split(const struct wide_item *item, uint32_t n, const struct wide_bo
         usable[a] = extent[a] > 0 && f < FLT_MAX;
         to_bins[a] = usable[a] ? f : 0;
     }
-    vf box[3][WIDE_MAX_BINS];
+    /* Neighbours fall into the same bins: by turns into two sets, so that one need not wait for the other. */
+    const uint32_t other = n < 64 ? 0 : 1;
+    vf both[2][3][WIDE_MAX_BINS], (*box)[WIDE_MAX_BINS] = both[0];
     uint32_t count[3][WIDE_MAX_BINS] = {{0}};
-    for (int a = 0; a < 3; a++)
-        for (int k = 0; k < bins; k++)
-            box[a][k] = vf_set(FLT_MAX);
+    for (uint32_t set = 0; set <= other; set++)
+        for (int a = 0; a < 3; a++)
+            for (int k = 0; k < bins; k++)
+                both[set][a][k] = vf_set(FLT_MAX);
     for (uint32_t i = 0; i < n; i++) {
-        vf x = item_box(item + i);
+        vf x = item_box(item + i), (*to)[WIDE_MAX_BINS] = both[i & other];
         vi k = __builtin_convertvector((x - swap_halves(x) - low) * to_bins, vi);
         for (int a = 0; a < 3; a++) {
-            box[a][k[a]] = vf_min(x, box[a][k[a]]);
+            to[a][k[a]] = vf_min(x, to[a][k[a]]);
             count[a][k[a]]++;
         }
     }
+    for (int a = 0; a < 3; a++)
+        for (int k = 0; other != 0 && k < bins; k++)
+            box[a][k] = vf_min(both[1][a][k], box[a][k]);
     out->cost = FLT_MAX;
     for (int a = 0; a < 3; a++) {
         if (!usable[a])

@@ -87,6 +87,12 @@ static bool reserve(struct wide_build *p, size_t more)
     return true;
 }
 
+/* As a rule: two for each leaf, of six items or more. What is not used is no memory yet. */
+static size_t most_parts(uint32_t items)
+{
+    return items / 3 + 2;
+}
+
 /* The best ways to hang part i on 1 to 8 children, by those of its halves [Ylitie17]. */
 static void best_slots(struct build *b, uint32_t i)
 {
@@ -202,7 +208,7 @@ static int grow_range(void *ctx, const struct parallel_task *task, struct parall
         struct branch n = {.at = t.at};
         struct build b = *g->b;
         b.parts = &n.parts;
-        bool ok = reserve(&n.parts, 2);
+        bool ok = reserve(&n.parts, most_parts(t.range.count));
         n.parts.num = 1;
         ok = ok && add_part(&b, 0, &t.range);
         pthread_mutex_lock(&g->lock);
@@ -279,12 +285,11 @@ bool wide_build_make(const struct sah_split_passes *s, struct wide_item *item,
     enum { LEAST_FOR_THREADS = 1 << 14 };
     struct build b = {.splitter = s, .item = item, .num_triangles = num_triangles, .parts = p};
     struct wide_range r = *all;
-    if (!reserve(p, 2))
+    const bool on_threads = threads > 1 && all->count >= LEAST_FOR_THREADS;
+    if (!reserve(p, on_threads ? 2 : most_parts(all->count)))
         return false;
     p->num = 1;
-    if (threads > 1 && all->count >= LEAST_FOR_THREADS)
-        return grow_on_threads(&b, all, threads);
-    return add_part(&b, 0, &r);
+    return on_threads ? grow_on_threads(&b, all, threads) : add_part(&b, 0, &r);
 }
 
 int wide_build_children(const struct wide_build *p, uint32_t i, uint32_t child[WIDTH])
