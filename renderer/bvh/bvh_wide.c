@@ -8,6 +8,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Bytes: what is larger is not in the cache when a ray comes to it. Tests: of boxes that overlap as much every ray
+ * meets the same ones, and these are. */
+enum { IN_TURNS_FROM = 16 << 20, IN_TURNS_TESTS = 64 };
+
 /* A leaf that has its place and is not filled yet. */
 struct empty_leaf {
     uint32_t place, first, count;
@@ -297,6 +301,7 @@ struct wide *wide_build(const struct scene *s, enum isa isa, int threads, struct
     }
     parallel_for(threads, w->num_leaves, fill_leaves, &b);
     float extent = maxf(maxf(w->max[0] - w->min[0], w->max[1] - w->min[1]), w->max[2] - w->min[2]);
+    w->in_turns = w->used > IN_TURNS_FROM && w->cost < IN_TURNS_TESTS;
     w->alike = 2.5f * extent / sqrtf((float)w->num_leaves);
     free(b.item);
     free(b.leaf);

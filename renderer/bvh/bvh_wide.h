@@ -49,6 +49,7 @@ struct wide {
     uint32_t num_sphere_leaves;     /* of a list: the last ones */
     uint32_t num_triangles;         /* of the scene: sphere i is primitive num_triangles + i */
     int depth;
+    bool in_turns; /* rays go through the tree in turns, since it is larger than the cache */
     float
         alike; /* rays that start as near to each other may go as a packet: a few leaves of a surface
                     that fills the scene */

@@ -73,14 +73,17 @@ INLINE void trace(const struct wide *w, const struct rays *r, const uint16_t *la
             single_init(o, __builtin_ctz(open), &single[n]);
             single_root(w, &single[n]);
         }
+        if (w->in_turns)
+            single_in_turns(w, single, n, any, stats);
         for (int j = 0; j < n; j++) {
             struct single *s = &single[j];
             int i = eight[s->lane];
+            if (!w->in_turns)
+                single_alone(w, s, any, stats);
             if (any) {
-                occluded[i] = single_occluded(w, s, stats);
+                occluded[i] = s->prim != NOTHING;
                 continue;
             }
-            single_closest(w, s, stats);
             bool none = s->prim == NOTHING;
             h->t[i] = none ? r->tmax[i] : s->limit;
             h->u[i] = s->u;

@@ -149,7 +149,7 @@ INLINE void packet_traverse(const struct wide *w, const struct bundle *b, struct
             unsigned hit = bundle_node(n, b, limit, &t);
             if (hit == 0)
                 goto pop;
-            ref = next_of(w, n, hit, t, &top);
+            ref = next_of(w, n, hit, t, true, &top);
         }
         stats->primitive_tests++;
         const struct wide_leaf *l = at(w, ref);

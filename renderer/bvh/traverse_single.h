@@ -144,78 +144,117 @@ INLINE bool single_descend(const struct wide *w, const struct slabs *b, vf limit
         unsigned hit = single_node(n, b, limit, &enter);
         if (hit == 0)
             return false;
-        *ref = next_of(w, n, hit, enter, top);
+        *ref = next_of(w, n, hit, enter, true, top);
     }
     return true;
 }
 
-static void single_closest(const struct wide *w, struct single *s, struct bvh_stats *stats)
+/* A leaf. True: the ray need not go on. */
+INLINE bool single_visit(const struct wide *w, struct single *s, uint32_t ref, bool any)
+{
+    const struct wide_leaf *l = at(w, ref);
+    vf t, u, v;
+    vi met = single_leaf(l, s, ref & WIDE_SPHERES, vf_set(s->limit), &t, &u, &v);
+    if (!bits(met))
+        return false;
+    if (!any) {
+        single_keep_nearest(l, bits(met), t, u, v, s);
+        return false;
+    }
+    const vi ignore = vi_set(((const int32_t *)&s->q->ignore)[s->lane]);
+    if (!bits(met & ~vi_eq(vi_load_any(l->prim), ignore)))
+        return false;
+    s->prim = 0; /* whichever */
+    return true;
+}
+
+/* What waits and is near enough. False: nothing. */
+INLINE bool single_pop(const struct single *s, bool any, const stacked *stack, stacked **top,
+                       uint32_t *ref)
+{
+    do {
+        if (*top == stack)
+            return false;
+        --*top;
+    } while (!any && stacked_t(**top) > s->limit);
+    *ref = stacked_ref(**top);
+    return true;
+}
+
+/* One ray from the root's children to its end; any: s->prim is NOTHING or not. */
+INLINE void single_alone(const struct wide *w, struct single *s, bool any, struct bvh_stats *stats)
 {
     stats->box_tests++;
     if (s->hit == 0)
         return;
     stacked stack[STACK], *top = stack;
-    uint32_t ref = next_of(w, (const struct wide_node *)w->arena, s->hit, s->enter, &top);
+    uint32_t ref = next_of(w, (const struct wide_node *)w->arena, s->hit, s->enter, true, &top);
     const struct slabs b = single_slabs(s);
-    vf limit = vf_set(s->limit), t, u, v;
     uint64_t nodes = 0, leaves = 0;
-    for (;;) {
-        if (!single_descend(w, &b, limit, &ref, &top, &nodes))
-            goto pop;
-        const struct wide_leaf *l = at(w, ref);
+    do {
+        if (!single_descend(w, &b, vf_set(s->limit), &ref, &top, &nodes))
+            continue;
         leaves++;
-        unsigned hit = bits(single_leaf(l, s, ref & WIDE_SPHERES, limit, &t, &u, &v));
-        if (hit) {
-            single_keep_nearest(l, hit, t, u, v, s);
-            limit = vf_set(s->limit);
-        }
-    pop:
-        do {
-            if (top == stack)
-                goto done;
-            top--;
-        } while (stacked_t(*top) > s->limit);
-        ref = stacked_ref(*top);
-    }
-done:
+        if (single_visit(w, s, ref, any))
+            break;
+    } while (single_pop(s, any, stack, &top, &ref));
     stats->box_tests += nodes;
     stats->primitive_tests += leaves;
 }
 
-static bool single_occluded(const struct wide *w, const struct single *s, struct bvh_stats *stats)
+/* A ray on its way: where it goes next, and what waits. */
+struct way {
+    struct single *s;
+    stacked *stack, *top;
+    uint32_t ref;
+};
+
+/* One node or leaf. False: the ray is at its end. */
+INLINE bool way_step(const struct wide *w, struct way *on, bool any, uint64_t *nodes,
+                     uint64_t *leaves)
 {
-    stats->box_tests++;
-    if (s->hit == 0)
-        return false;
-    stacked stack[STACK], *top = stack;
-    uint32_t ref = next_of(w, (const struct wide_node *)w->arena, s->hit, s->enter, &top);
-    const struct slabs b = single_slabs(s);
-    const vf limit = vf_set(s->limit);
-    vf t, u, v;
-    uint64_t nodes = 0, leaves = 0;
-    bool met_something = false;
-    for (;;) {
-        if (!single_descend(w, &b, limit, &ref, &top, &nodes))
-            goto pop;
-        const struct wide_leaf *l = at(w, ref);
-        leaves++;
-        vi met = single_leaf(l, s, ref & WIDE_SPHERES, limit, &t, &u, &v);
-        if (bits(met)) {
-            vi prim;
-            memcpy(&prim, l->prim, sizeof prim);
-            if (bits(met & ~vi_eq(prim, vi_set(((const int32_t *)&s->q->ignore)[s->lane])))) {
-                met_something = true;
-                break;
-            }
-        }
-    pop:
-        if (top == stack)
-            break;
-        ref = stacked_ref(*--top);
+    struct single *s = on->s;
+    if (on->ref & WIDE_LEAF) {
+        ++*leaves;
+        return !single_visit(w, s, on->ref, any) &&
+               single_pop(s, any, on->stack, &on->top, &on->ref);
     }
+    const struct wide_node *n = (const struct wide_node *)(w->arena + on->ref);
+    const struct slabs b = single_slabs(s);
+    vf enter;
+    ++*nodes;
+    unsigned hit = single_node(n, &b, vf_set(s->limit), &enter);
+    if (hit == 0)
+        return single_pop(s, any, on->stack, &on->top, &on->ref);
+    on->ref = next_of(w, n, hit, enter, false, &on->top);
+    return true;
+}
+
+/* The same of up to eight rays, each a step in its turn: while one waits for memory the others go on. */
+static __attribute__((noinline)) void single_in_turns(const struct wide *w, struct single *s, int n,
+                                                      bool any, struct bvh_stats *stats)
+{
+    stacked stack[LANES][STACK];
+    struct way way[LANES], *end = way;
+    uint64_t nodes = (uint64_t)n, leaves = 0;
+    for (int k = 0; k < n; k++, s++)
+        if (s->hit != 0) {
+            *end = (struct way){.s = s, .stack = stack[k], .top = stack[k]};
+            end->ref =
+                next_of(w, (const struct wide_node *)w->arena, s->hit, s->enter, false, &end->top);
+            end++;
+        }
+    while (end > way)
+        for (struct way *on = way; on < end;)
+            if (way_step(w, on, any, &nodes, &leaves)) {
+                fetch_ahead(w, on->ref, true);
+                __builtin_prefetch((const char *)at(w, on->ref) + sizeof(struct wide_node));
+                on++;
+            } else {
+                *on = *--end;
+            }
     stats->box_tests += nodes;
     stats->primitive_tests += leaves;
-    return met_something;
 }
 
 #endif

@@ -19,9 +19,11 @@ static inline const void *at(const struct wide *w, uint32_t ref)
     return w->arena + (ref & WIDE_PLACE);
 }
 
-INLINE void fetch_ahead(const struct wide *w, uint32_t ref)
+INLINE void fetch_ahead(const struct wide *w, uint32_t ref, bool ahead)
 {
     const char *p = at(w, ref);
+    if (!ahead)
+        return;
     __builtin_prefetch(p);
     __builtin_prefetch(p + 64);
     __builtin_prefetch(p + 128);
@@ -58,7 +60,7 @@ INLINE void order(stacked *near, stacked *far)
 
 /* Pushes the children, two or more, the farthest first, but returns the nearest. */
 INLINE uint32_t push_sorted(const struct wide *w, const struct wide_node *n, unsigned hit, vf enter,
-                            stacked **top)
+                            bool ahead, stacked **top)
 {
     float t[LANES] __attribute__((aligned(32)));
     vf_store(t, enter);
@@ -67,14 +69,14 @@ INLINE uint32_t push_sorted(const struct wide *w, const struct wide_node *n, uns
     int j = __builtin_ctz(hit);
     hit &= hit - 1;
     stacked near = stack_entry(t[i], n->child[i]), far = stack_entry(t[j], n->child[j]);
-    fetch_ahead(w, n->child[i]);
-    fetch_ahead(w, n->child[j]);
+    fetch_ahead(w, n->child[i], ahead);
+    fetch_ahead(w, n->child[j], ahead);
     order(&near, &far);
     stacked *p = *top;
     if (hit) {
         i = __builtin_ctz(hit);
         hit &= hit - 1;
-        fetch_ahead(w, n->child[i]);
+        fetch_ahead(w, n->child[i], ahead);
         stacked third = stack_entry(t[i], n->child[i]);
         order(&near, &third);
         order(&far, &third);
@@ -82,7 +84,7 @@ INLINE uint32_t push_sorted(const struct wide *w, const struct wide_node *n, uns
         while (hit) {
             i = __builtin_ctz(hit);
             hit &= hit - 1;
-            fetch_ahead(w, n->child[i]);
+            fetch_ahead(w, n->child[i], ahead);
             stacked next = stack_entry(t[i], n->child[i]);
             order(&near, &next);
             order(&far, &next);
@@ -97,12 +99,13 @@ INLINE uint32_t push_sorted(const struct wide *w, const struct wide_node *n, uns
     return stacked_ref(near);
 }
 
+/* Of the children that are met the nearest; the others are pushed. ahead: all are fetched. */
 INLINE uint32_t next_of(const struct wide *w, const struct wide_node *n, unsigned hit, vf enter,
-                        stacked **top)
+                        bool ahead, stacked **top)
 {
     if ((hit & (hit - 1)) == 0)
         return n->child[__builtin_ctz(hit)];
-    return push_sorted(w, n, hit, enter, top);
+    return push_sorted(w, n, hit, enter, ahead, top);
 }
 
 #endif

@@ -147,6 +147,8 @@ static void compare(const char *name, struct scene s, uint32_t batches, uint32_t
             lane[i] = (uint16_t)i;
         }
         trace(sah, &r, lane, BATCH_LANES, &want);
+        for (int j = 0; j < n; j++) /* which large trees are for: the same */
+            wide[j]->wide->in_turns = k % 2;
         bool try_all = brute != 0 && k % brute == 0;
         if (try_all)
             trace(all, &r, lane, BATCH_LANES, &exact);
