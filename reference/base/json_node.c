@@ -7,8 +7,7 @@ bool json_only_keys(const struct json_node *n, const char *const *allowed, struc
 {
     const char *key;
     json_t *value;
-    json_object_foreach(n->object, key, value)
-    {
+    json_object_foreach(n->object, key, value) {
         const char *const *k = allowed;
         while (*k != NULL && strcmp(*k, key) != 0)
             k++;
@@ -94,6 +93,12 @@ json_t *json_interval(double lo, double hi)
     return isfinite(lo) && isfinite(hi) ? json_pack("[f,f]", lo, hi) : json_null();
 }
 
+bool json_is_interval(const json_t *v)
+{
+    double lo, hi;
+    return json_unpack((json_t *)v, "[FF!]", &lo, &hi) == 0 && lo <= hi;
+}
+
 const char *member_text(const json_t *object, const char *name)
 {
     return json_string_value(json_object_get(object, name));
@@ -119,8 +124,7 @@ const json_t *member_named(const json_t *array, const char *name)
 {
     size_t i;
     json_t *object;
-    json_array_foreach(array, i, object)
-    {
+    json_array_foreach(array, i, object) {
         if (strcmp(member_or_empty(object, "name"), name) == 0)
             return object;
     }

@@ -38,6 +38,9 @@ bool json_get_text(const struct json_node *n, const char *key, char *out, size_t
 json_t *json_finite(double v);
 json_t *json_interval(double lo, double hi);
 
+/* Two numbers, the lower first? */
+bool json_is_interval(const json_t *v);
+
 /* A member of an object of which all is known: NULL, "" and 0 where it is absent. */
 const char *member_text(const json_t *object, const char *name);
 const char *member_or_empty(const json_t *object, const char *name);

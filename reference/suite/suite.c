@@ -1,3 +1,4 @@
+#define _GNU_SOURCE
 #include "suite.h"
 
 #include "suite_json.h"
@@ -10,93 +11,59 @@
 
 #include <dirent.h>
 #include <errno.h>
-#include <limits.h>
-#include <stdint.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+/* Where the name of a scene's file ends, in ".dae" or ".json"; NULL of other files. */
+static const char *ending_of(const char *file)
+{
+    const char *dot = strrchr(file, '.');
+    return file[0] != '.' && dot != NULL && (strcmp(dot, ".dae") == 0 || strcmp(dot, ".json") == 0)
+               ? dot
+               : NULL;
+}
+
+static int is_of_scene(const struct dirent *d)
+{
+    return ending_of(d->d_name) != NULL;
+}
+
+static int by_bytes(const struct dirent **a, const struct dirent **b)
+{
+    return strcmp((*a)->d_name, (*b)->d_name);
+}
+
 /* "NN_name": a family digit, a digit, an underscore, then a-z, 0-9 and underscores. */
 static bool is_scene_name(const char *s)
 {
-    if (strchr("1234569", s[0]) == NULL || s[0] == '\0' || s[1] < '0' || s[1] > '9' ||
-        s[2] != '_' || s[3] == '\0')
-        return false;
-    return s[3 + strspn(s + 3, "abcdefghijklmnopqrstuvwxyz0123456789_")] == '\0';
+    static const char letters[] = "abcdefghijklmnopqrstuvwxyz0123456789_";
+    const char *end = ending_of(s);
+    return strchr("1234569", s[0]) != NULL && s[1] >= '0' && s[1] <= '9' && s[2] == '_' &&
+           s + 3 + strspn(s + 3, letters) == end && end > s + 3 &&
+           end - s < (ptrdiff_t)sizeof((struct suite_scene *)NULL)->name;
 }
 
-/* Name without the extension, and which of the two files were seen. */
-struct stem {
-    char name[64];
-    bool dae, json;
-};
-
-struct stems {
-    struct stem *stem;
-    size_t num;
-};
-
-static int by_name(const void *a, const void *b)
+/* Of each scene the .dae and the .json, which follow each other in the order of all names. */
+static bool check_files(const char *dir, struct dirent **file, int num, struct err *e)
 {
-    return strcmp(((const struct stem *)a)->name, ((const struct stem *)b)->name);
-}
-
-static bool note_file(struct stems *s, const char *dir, const char *file, struct err *e)
-{
-    const char *dot = strrchr(file, '.');
-    bool dae = dot != NULL && strcmp(dot, ".dae") == 0;
-    bool json = dot != NULL && strcmp(dot, ".json") == 0;
-    if (file[0] == '.' || (!dae && !json))
-        return true;
-    struct stem new = {.dae = dae, .json = json};
-    size_t length = (size_t)(dot - file);
-    if (length < sizeof new.name)
-        memcpy(new.name, file, length);
-    if (!is_scene_name(new.name))
-        return err_set(e,
-                       "%s/%s: not named NN_name (families 1x to 6x, 9x; a-z, 0-9, _; "
-                       "at most 63 bytes)",
-                       dir, file);
-    for (size_t i = 0; i < s->num; i++)
-        if (strcmp(s->stem[i].name, new.name) == 0) {
-            s->stem[i].dae |= dae;
-            s->stem[i].json |= json;
-            return true;
-        }
-    struct stem *grown = realloc(s->stem, (s->num + 1) * sizeof *grown);
-    if (grown == NULL)
-        return err_set(e, "%s: out of memory", dir);
-    s->stem = grown;
-    s->stem[s->num++] = new;
-    return true;
-}
-
-/* Scene names of a directory, sorted, each with both files. The caller frees out->stem, also on
- * failure. */
-static bool list_scenes(const char *dir, struct stems *out, struct err *e)
-{
-    DIR *d = opendir(dir);
-    if (d == NULL)
-        return err_set(e, "%s: %s", dir, strerror(errno));
-    bool ok = true;
-    struct dirent *entry;
-    while (ok && (errno = 0, entry = readdir(d)) != NULL)
-        ok = note_file(out, dir, entry->d_name, e);
-    if (ok && errno != 0)
-        ok = err_set(e, "%s: %s", dir, strerror(errno));
-    closedir(d);
-    if (!ok)
-        return false;
-    if (out->num == 0)
+    if (num == 0)
         return err_set(e, "%s: no scenes (NN_name.dae with NN_name.json)", dir);
-    if (out->num > INT_MAX)
-        return err_set(e, "%s: too many scenes", dir);
-    qsort(out->stem, out->num, sizeof *out->stem, by_name);
-    for (size_t i = 0; i < out->num; i++)
-        if (!out->stem[i].dae || !out->stem[i].json)
-            return err_set(e, "%s/%s.%s: no %s.%s beside it", dir, out->stem[i].name,
-                           out->stem[i].dae ? "dae" : "json", out->stem[i].name,
-                           out->stem[i].dae ? "json" : "dae");
+    for (int i = 0; i < num; i++)
+        if (!is_scene_name(file[i]->d_name))
+            return err_set(e,
+                           "%s/%s: not named NN_name (families 1x to 6x, 9x; a-z, 0-9, _; "
+                           "at most 63 bytes)",
+                           dir, file[i]->d_name);
+    for (int i = 0; i < num; i += 2) {
+        const char *name = file[i]->d_name, *end = ending_of(name);
+        const int stem = (int)(end - name);
+        bool dae = strcmp(end, ".dae") == 0;
+        if (!dae || i + 1 == num || strncmp(name, file[i + 1]->d_name, (size_t)stem + 1) != 0)
+            return err_set(e, "%s/%s: no %.*s.%s beside it", dir, name, stem, name,
+                           dae ? "json" : "dae");
+    }
     return true;
 }
 
@@ -134,14 +101,14 @@ static bool hash_scene(const char *dir, struct suite_scene *s, struct err *e)
     return true;
 }
 
-static bool load_scene(const char *dir, const char *name, struct suite_scene *s, struct err *e)
+static bool load_scene(const char *dir, const char *dae, struct suite_scene *s, struct err *e)
 {
     char file[sizeof s->dae];
-    memcpy(s->name, name, strlen(name) + 1);
-    int length = snprintf(file, sizeof file, "%s/%s.json", dir, name);
+    snprintf(s->name, sizeof s->name, "%.*s", (int)(ending_of(dae) - dae), dae);
+    int length = snprintf(file, sizeof file, "%s/%s.json", dir, s->name);
     if (length < 0 || (size_t)length >= sizeof file)
-        return err_set(e, "%s: path too long", name);
-    snprintf(s->dae, sizeof s->dae, "%s/%s.dae", dir, name);
+        return err_set(e, "%s: path too long", s->name);
+    snprintf(s->dae, sizeof s->dae, "%s/%s.dae", dir, s->name);
     s->json = json_read_or_say(file, e);
     return s->json != NULL && suite_json_read(file, s, e) && hash_scene(dir, s, e);
 }
@@ -192,30 +159,28 @@ static bool load_own(const char *dir, struct suite *out, struct err *e)
 bool suite_load(const char *dir, struct suite *out, struct err *e)
 {
     struct suite suite = {0};
-    struct stems stems = {0};
+    struct dirent **file;
     if (suite_own_is(dir))
         return load_own(dir, out, e);
-    if (!list_scenes(dir, &stems, e))
-        goto fail;
-    suite.scene = calloc(stems.num, sizeof *suite.scene);
-    if (suite.scene == NULL) {
-        err_set(e, "%s: out of memory", dir);
-        goto fail;
-    }
-    suite.num_scenes = (int)stems.num;
-    for (size_t i = 0; i < stems.num; i++)
-        if (!load_scene(dir, stems.stem[i].name, &suite.scene[i], e))
-            goto fail;
-    for (size_t i = 0; i < stems.num; i++)
-        if (!inherit(&suite, dir, &suite.scene[i], e))
-            goto fail;
-    free(stems.stem);
-    *out = suite;
-    return true;
-fail:
-    free(stems.stem);
-    suite_free(&suite);
-    return false;
+    int num = scandir(dir, &file, is_of_scene, by_bytes);
+    if (num < 0)
+        return err_set(e, "%s: %s", dir, strerror(errno));
+    bool ok = check_files(dir, file, num, e);
+    suite.scene = ok ? calloc((size_t)num / 2, sizeof *suite.scene) : NULL;
+    ok = ok && (suite.scene != NULL || err_set(e, "%s: out of memory", dir));
+    suite.num_scenes = ok ? num / 2 : 0;
+    for (int i = 0; ok && i < suite.num_scenes; i++)
+        ok = load_scene(dir, file[(size_t)i * 2]->d_name, &suite.scene[i], e);
+    for (int i = 0; ok && i < suite.num_scenes; i++)
+        ok = inherit(&suite, dir, &suite.scene[i], e);
+    for (int i = 0; i < num; i++)
+        free(file[i]);
+    free(file);
+    if (ok)
+        *out = suite;
+    else
+        suite_free(&suite);
+    return ok;
 }
 
 bool suite_open(const struct suite_scene *s, struct scene *scene, struct camera *camera,

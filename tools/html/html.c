@@ -131,16 +131,11 @@ struct number_text html_date(const char *utc)
 {
     struct number_text text = {""};
     struct tm t = {0}, local;
-    char end;
     if (utc == NULL)
         return text;
     snprintf(text.s, sizeof text.s, "%s", utc);
-    if (sscanf(utc, "%d-%d-%dT%d:%d:%d%c", &t.tm_year, &t.tm_mon, &t.tm_mday, &t.tm_hour, &t.tm_min,
-               &t.tm_sec, &end) != 7 ||
-        end != 'Z')
+    if (strptime(utc, "%Y-%m-%dT%H:%M:%SZ", &t) == NULL)
         return text;
-    t.tm_year -= 1900;
-    t.tm_mon -= 1;
     const time_t when = timegm(&t);
     if (localtime_r(&when, &local) == NULL ||
         strftime(text.s, sizeof text.s, "%Y-%m-%d %H:%M %Z", &local) == 0)

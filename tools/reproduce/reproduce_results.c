@@ -52,18 +52,14 @@ static void walk(const char *at, const json_t *then, const json_t *now, struct r
     const char *key;
     json_t *v;
     if (json_is_object(then) && json_is_object(now)) {
-        json_object_foreach((json_t *)then, key, v)
-        {
+        json_t *either = json_copy((json_t *)then);
+        json_object_update_missing(either, (json_t *)now);
+        json_object_foreach(either, key, v) {
             snprintf(path, sizeof path, "%s%s%s", at, at[0] != '\0' ? "." : "", key);
             if (!is_of_the_run(key))
-                walk(path, v, json_object_get(now, key), out);
+                walk(path, json_object_get(then, key), json_object_get(now, key), out);
         }
-        json_object_foreach((json_t *)now, key, v)
-        {
-            snprintf(path, sizeof path, "%s%s%s", at, at[0] != '\0' ? "." : "", key);
-            if (!is_of_the_run(key) && json_object_get(then, key) == NULL)
-                walk(path, NULL, v, out);
-        }
+        json_decref(either);
         return;
     }
     if (json_is_array(then) && json_array_size(then) == json_array_size(now)) {

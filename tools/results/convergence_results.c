@@ -25,11 +25,8 @@ static bool check_interval(const json_t *object, const char *name, bool positive
     const json_t *v = json_object_get(object, name);
     if (may_be_null && json_is_null(v))
         return true;
-    const json_t *lo = json_array_get(v, 0), *hi = json_array_get(v, 1);
-    if (json_array_size(v) != 2 || !json_is_number(lo) || !json_is_number(hi) ||
-        json_number_value(lo) > json_number_value(hi) || (positive && !(json_number_value(lo) > 0)))
-        return err_set(e, "%s: '%s' is not an interval", where, name);
-    return true;
+    return (json_is_interval(v) && (!positive || member_end(object, name, 0) > 0)) ||
+           err_set(e, "%s: '%s' is not an interval", where, name);
 }
 
 static bool check_text(const json_t *object, const char *name, const char *where, struct err *e)
@@ -235,23 +232,23 @@ static void engine_rows(const struct sink *s, const json_t *scene, const json_t 
     emit(s, name, engine, quantity, text, member_text(j, "floor_verdict"));
 }
 
+static void ratio_row(const struct sink *s, const char *scene, const json_t *ratio, size_t rung,
+                      const char *name, const char *interval)
+{
+    const json_t *g = json_array_get(json_object_get(ratio, "rungs"), rung);
+    char quantity[128], text[160];
+    snprintf(quantity, sizeof quantity, "%s / %s's at %g spp", name, member_text(ratio, "b"),
+             member_number(g, "spp"));
+    format_value(text, sizeof text, g, name, interval);
+    emit(s, scene, member_text(ratio, "a"), quantity, text, measured);
+}
+
 static void ratio_rows(const struct sink *s, const char *scene, const json_t *ratio)
 {
-    const json_t *rungs = json_object_get(ratio, "rungs");
-    size_t last = json_array_size(rungs) - 1;
-    char quantity[128], text[160];
-    for (size_t i = 0; i <= last; i += last) {
-        const json_t *g = json_array_get(rungs, i);
-        snprintf(quantity, sizeof quantity, "variance / %s's at %g spp", member_text(ratio, "b"),
-                 member_number(g, "spp"));
-        format_value(text, sizeof text, g, "variance", "variance_ci");
-        emit(s, scene, member_text(ratio, "a"), quantity, text, measured);
-    }
-    const json_t *top = json_array_get(rungs, last);
-    snprintf(quantity, sizeof quantity, "efficiency / %s's at %g spp", member_text(ratio, "b"),
-             member_number(top, "spp"));
-    format_value(text, sizeof text, top, "efficiency", "efficiency_ci");
-    emit(s, scene, member_text(ratio, "a"), quantity, text, measured);
+    size_t last = json_array_size(json_object_get(ratio, "rungs")) - 1;
+    ratio_row(s, scene, ratio, 0, "variance", "variance_ci");
+    ratio_row(s, scene, ratio, last, "variance", "variance_ci");
+    ratio_row(s, scene, ratio, last, "efficiency", "efficiency_ci");
 }
 
 void convergence_results_rows(const json_t *scene,

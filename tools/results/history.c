@@ -73,12 +73,12 @@ static double number_or_nan(const json_t *object, const char *name)
 
 static struct history_point point_of(const json_t *claim, size_t run)
 {
-    const json_t *ci = json_object_get(claim, "ci");
     struct history_point p = {
         .run = run,
+        .alpha = member_number(claim, "alpha"),
         .difference = member_number(claim, "difference"),
-        .low = json_number_value(json_array_get(ci, 0)),
-        .high = json_number_value(json_array_get(ci, 1)),
+        .low = member_end(claim, "ci", 0),
+        .high = member_end(claim, "ci", 1),
         .variance_ratio = number_or_nan(json_object_get(claim, "variance_ratio"), "ratio"),
         .seconds = number_or_nan(claim, "seconds_a"),
     };
@@ -135,24 +135,9 @@ static const json_t *list_of(const struct history *h, size_t run, int list)
 
 enum { LISTS = 2 };
 
-static double std_error(const struct history_point *p, double alpha)
+static double std_error(const struct history_point *p)
 {
-    return (p->high - p->low) / 2 / gsl_cdf_ugaussian_Qinv(fmin(alpha, 0.4));
-}
-
-/* alpha of the claim that gave a point. */
-static double alpha_of(const struct history *h, const struct history_series *s,
-                       const struct history_point *p)
-{
-    for (int list = 0; list < LISTS; list++) {
-        const json_t *claims = list_of(h, p->run, list);
-        for (size_t i = 0; i < json_array_size(claims); i++) {
-            const json_t *c = json_array_get(claims, i);
-            if (is_of(s, c))
-                return member_number(c, "alpha");
-        }
-    }
-    return member_number(h->run[p->run].results, "alpha");
+    return (p->high - p->low) / 2 / gsl_cdf_ugaussian_Qinv(fmin(p->alpha, 0.4));
 }
 
 /* Weighted by 1/variance; equal weights where nothing has any noise. */
@@ -161,9 +146,9 @@ static void find_move(const struct history *h, struct history_series *s)
     if (s->num < 2 || s->point[s->num - 1].run != h->num_runs - 1)
         return;
     const struct history_point *last = &s->point[s->num - 1];
-    double weights = 0, sum = 0, plain = 0, se = std_error(last, alpha_of(h, s, last));
+    double weights = 0, sum = 0, plain = 0, se = std_error(last);
     for (size_t i = 0; i + 1 < s->num; i++) {
-        double one = std_error(&s->point[i], alpha_of(h, s, &s->point[i]));
+        double one = std_error(&s->point[i]);
         double weight = one > 0 ? 1 / (one * one) : 0;
         weights += weight;
         sum += weight * s->point[i].difference;

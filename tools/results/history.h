@@ -22,6 +22,7 @@ struct history_run {
 /* One claim in one run. What is not known is NAN. */
 struct history_point {
     size_t run;
+    double alpha;                 /* of the claim */
     double difference, low, high; /* relative */
     double variance_ratio;        /* a path of A over one of B */
     double seconds;               /* of A */

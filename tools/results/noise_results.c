@@ -6,13 +6,6 @@
 
 static const char measured[] = "MEASURED";
 
-static bool is_interval(const json_t *v)
-{
-    return json_array_size(v) == 2 && json_is_number(json_array_get(v, 0)) &&
-           json_is_number(json_array_get(v, 1)) &&
-           json_number_value(json_array_get(v, 0)) <= json_number_value(json_array_get(v, 1));
-}
-
 /* A number and, with the ending "_ci", its interval, which a run may not know. */
 static bool check_estimate(const json_t *j, const char *name, bool required, const char *where,
                            struct err *e)
@@ -25,7 +18,7 @@ static bool check_estimate(const json_t *j, const char *name, bool required, con
         return true;
     if (!json_is_number(v))
         return err_set(e, "%s: '%s' is not a number", where, name);
-    return json_is_null(i) || is_interval(i) ||
+    return json_is_null(i) || json_is_interval(i) ||
            err_set(e, "%s: '%s' is neither an interval nor null", where, ci);
 }
 

@@ -96,14 +96,10 @@ static bool is_count(const json_t *v)
     return json_is_integer(v) && json_integer_value(v) >= 0;
 }
 
-static bool are_numbers(const json_t *v, size_t size)
+static bool is_triple(const json_t *v)
 {
-    if (!json_is_array(v) || json_array_size(v) != size)
-        return false;
-    for (size_t i = 0; i < size; i++)
-        if (!json_is_number(json_array_get(v, i)))
-            return false;
-    return true;
+    double x, y, z;
+    return json_unpack((json_t *)v, "[FFF!]", &x, &y, &z) == 0;
 }
 
 /* NULL if v is of that type, else what it should be, in words. */
@@ -114,12 +110,8 @@ static const char *type_error(const json_t *v, enum member_type type)
     case NUMBER: return json_is_number(v) ? NULL : "a number";
     case COUNT: return is_count(v) ? NULL : "a whole number of 0 or more";
     case BOOLEAN: return json_is_boolean(v) ? NULL : "true or false";
-    case INTERVAL:
-        return are_numbers(v, 2) && json_number_value(json_array_get(v, 0)) <=
-                                        json_number_value(json_array_get(v, 1))
-                   ? NULL
-                   : "an array of two numbers, the lower first";
-    case TRIPLE: return are_numbers(v, 3) ? NULL : "an array of three numbers";
+    case INTERVAL: return json_is_interval(v) ? NULL : "an array of two numbers, the lower first";
+    case TRIPLE: return is_triple(v) ? NULL : "an array of three numbers";
     case COUNTS:
         if (!json_is_array(v))
             return "an array of whole numbers";

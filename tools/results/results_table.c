@@ -127,15 +127,15 @@ static void print_terminal(FILE *f, const json_t *claims)
         if (column->text == NULL)
             continue;
         width[c] = text_columns(column->text);
-        json_array_foreach(claims, i, claim)
-        {
+        json_array_foreach(claims, i, claim) {
             cell_buffer buffer;
             size_t w = text_columns(cell_text(column, claim, false, buffer));
             width[c] = w > width[c] ? w : width[c];
         }
     }
     print_line(f, NULL, width);
-    json_array_foreach(claims, i, claim) print_line(f, claim, width);
+    json_array_foreach(claims, i, claim)
+        print_line(f, claim, width);
 }
 
 /* A backslash or a character reference for what would end the cell or start markup. */

@@ -4,12 +4,6 @@
 
 #include <string.h>
 
-static bool is_interval(const json_t *v)
-{
-    return json_array_size(v) == 2 && json_is_number(json_array_get(v, 0)) &&
-           json_is_number(json_array_get(v, 1));
-}
-
 /* Of a claim with an error. */
 static bool only_time_missing(const json_t *c)
 {
@@ -30,11 +24,12 @@ static bool check_one(const json_t *c, const char *where, struct err *e)
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
         if (!json_is_number(json_object_get(c, numbers[i])))
             return err_set(e, "%s: '%s' is not a number", where, numbers[i]);
-    if (!is_interval(json_object_get(c, "pixels_ci")) ||
-        !is_interval(json_object_get(c, "image_range")))
+    if (!json_is_interval(json_object_get(c, "pixels_ci")) ||
+        !json_is_interval(json_object_get(c, "image_range")))
         return err_set(e, "%s: 'pixels_ci' or 'image_range' is not an interval", where);
     const json_t *noise = json_object_get(c, "noise"), *early = json_object_get(c, "too_early");
-    if (noise != NULL && (!json_is_number(noise) || !is_interval(json_object_get(c, "noise_ci"))))
+    if (noise != NULL &&
+        (!json_is_number(noise) || !json_is_interval(json_object_get(c, "noise_ci"))))
         return err_set(e, "%s: 'noise' is not a number or 'noise_ci' is not an interval", where);
     if (early != NULL &&
         (!json_is_integer(early) || !json_is_integer(json_object_get(c, "too_late"))))
@@ -65,13 +60,9 @@ enum outcome stated_error_outcome(const json_t *claim)
     enum verdict v;
     if (member_text(claim, "verdict") == NULL || !verdict_parse(member_text(claim, "verdict"), &v))
         return OUTCOME_NOT_JUDGED;
-    switch (v) {
-    case VERDICT_EQUIVALENT: return OUTCOME_AS_EXPECTED;
-    case VERDICT_DIFFERENT: return OUTCOME_OPPOSITE;
-    case VERDICT_NOTHING_FOUND:
-    case VERDICT_INCONCLUSIVE: break;
-    }
-    return OUTCOME_UNDECIDED;
+    return v == VERDICT_EQUIVALENT  ? OUTCOME_AS_EXPECTED
+           : v == VERDICT_DIFFERENT ? OUTCOME_OPPOSITE
+                                    : OUTCOME_UNDECIDED;
 }
 
 /* The last columns: noise, and pixels that break the stop rule; empty where the scene does not ask. */

@@ -234,31 +234,23 @@ json_t *noise_ladder_json(const struct noise_ladder *l)
 
 static bool parse_estimate(const json_t *v, struct estimate *out)
 {
-    double x[3];
-    if (json_array_size(v) != 3)
-        return false;
-    for (size_t i = 0; i < 3; i++) {
-        if (!json_is_number(json_array_get(v, i)))
-            return false;
-        x[i] = json_number_value(json_array_get(v, i));
-    }
-    *out = (struct estimate){x[0], x[1], x[2]};
-    return x[0] >= 0 && x[1] >= 0 && x[2] > 0;
+    return json_unpack((json_t *)v, "[FFF!]", &out->value, &out->se, &out->dof) == 0 &&
+           out->value >= 0 && out->se >= 0 && out->dof > 0;
 }
 
 static bool parse_sample(const json_t *sample, struct noise_ladder *out)
 {
     struct variance_map *m = &out->sample;
     const json_t *tile = json_object_get(sample, "tile");
-    json_int_t x = json_integer_value(json_object_get(sample, "tiles_x"));
-    json_int_t y = json_integer_value(json_object_get(sample, "tiles_y"));
     size_t num = json_array_size(tile);
-    out->n = json_number_value(json_object_get(sample, "n"));
-    if (!(out->n > 0) || x < 1 || y < 1 || x > 4096 || y > 4096 || num != (size_t)(x * y) ||
+    int x, y;
+    if (json_unpack((json_t *)sample, "{s:F,s:i,s:i}", "n", &out->n, "tiles_x", &x, "tiles_y",
+                    &y) != 0 ||
+        !(out->n > 0) || x < 1 || y < 1 || x > 4096 || y > 4096 || num != (size_t)(x * y) ||
         !parse_estimate(json_object_get(sample, "variance"), &m->image))
         return false;
-    m->tiles_x = (int)x;
-    m->tiles_y = (int)y;
+    m->tiles_x = x;
+    m->tiles_y = y;
     m->tile = calloc(num, sizeof *m->tile);
     for (size_t i = 0; i < num; i++)
         if (m->tile == NULL || !parse_estimate(json_array_get(tile, i), &m->tile[i]))
@@ -272,13 +264,12 @@ static bool parse_rungs(const json_t *rungs, struct noise_ladder *out)
     if (out->num < 1 || out->num > NOISE_RUNGS)
         return false;
     for (int i = 0; i < out->num; i++) {
-        const json_t *g = json_array_get(rungs, (size_t)i);
-        json_int_t spp = json_integer_value(json_object_get(g, "spp"));
-        if (spp < 1 || spp > INT32_MAX ||
-            !parse_estimate(json_object_get(g, "variance"), &out->rung[i].variance))
+        struct noise_rung *g = &out->rung[i];
+        json_t *variance;
+        if (json_unpack(json_array_get(rungs, (size_t)i), "{s:i,s:o,s?F}", "spp", &g->spp,
+                        "variance", &variance, "cpu_s", &g->cpu_s) != 0 ||
+            g->spp < 1 || !parse_estimate(variance, &g->variance))
             return false;
-        out->rung[i].spp = (int)spp;
-        out->rung[i].cpu_s = json_number_value(json_object_get(g, "cpu_s"));
     }
     return true;
 }
