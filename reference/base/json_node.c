@@ -1,6 +1,9 @@
 #include "json_node.h"
 
+#include "renderer/base/shell_quote.h"
+
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 bool json_only_keys(const struct json_node *n, const char *const *allowed, struct err *e)
@@ -91,6 +94,17 @@ json_t *json_finite(double v)
 json_t *json_interval(double lo, double hi)
 {
     return isfinite(lo) && isfinite(hi) ? json_pack("[f,f]", lo, hi) : json_null();
+}
+
+char *json_command_line(const char *first, const json_t *words)
+{
+    size_t num = json_array_size(words);
+    const char **word = calloc(num + 1, sizeof *word);
+    for (size_t i = 0; word != NULL && i < num; i++)
+        word[i] = json_string_value(json_array_get(words, i));
+    char *text = word != NULL ? shell_quote_join(first, word) : NULL;
+    free(word);
+    return text;
 }
 
 bool json_is_interval(const json_t *v)

@@ -38,6 +38,10 @@ bool json_get_text(const struct json_node *n, const char *key, char *out, size_t
 json_t *json_finite(double v);
 json_t *json_interval(double lo, double hi);
 
+/* An array of texts as a command line, after `first` (NULL: nothing), in words that shell_quote_split() reads back: to free(). NULL
+ * out of memory. */
+char *json_command_line(const char *first, const json_t *words) __attribute__((warn_unused_result));
+
 /* Two numbers, the lower first? */
 bool json_is_interval(const json_t *v);
 

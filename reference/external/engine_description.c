@@ -91,8 +91,7 @@ static bool check_arguments(const struct json_node *n, const char *key, const ch
         return false;
     if (!json_is_array(array) || json_array_size(array) == 0 || json_array_size(array) > 256)
         return err_set(e, "%s: '%s' is not a list of 1 to 256 texts", n->file, key);
-    json_array_foreach(array, index, value)
-    {
+    json_array_foreach(array, index, value) {
         const char *text = json_string_value(value);
         if (text == NULL || (index == 0 && text[0] == '\0'))
             return err_set(e, "%s: '%s' [%zu] is not a text", n->file, key, index);
@@ -135,8 +134,7 @@ static bool read_features(const struct json_node *n, struct engine *en, struct e
         return false;
     if (!json_is_array(array))
         return err_set(e, "%s: 'expresses' is not a list", n->file);
-    json_array_foreach(array, index, value)
-    {
+    json_array_foreach(array, index, value) {
         const char *text = json_string_value(value);
         int at = text != NULL ? find(feature_names, text, strlen(text)) : -1;
         if (at < 0)
@@ -342,8 +340,8 @@ bool engine_argv(const struct engine *en, const char *const *keys,
     const char *missing = NULL;
     const json_t *arg;
     for (const char *const *key = keys; *key != NULL; key++) {
-        json_array_foreach(json_object_get(en->json, *key), i, arg) bytes +=
-            fill_in(json_string_value(arg), values, NULL, 0, &missing);
+        json_array_foreach(json_object_get(en->json, *key), i, arg)
+            bytes += fill_in(json_string_value(arg), values, NULL, 0, &missing);
         num += json_array_size(json_object_get(en->json, *key));
         if (missing != NULL)
             return err_set(e, "%s: '%s': no value for '%.*s'", en->file, *key,
@@ -354,8 +352,7 @@ bool engine_argv(const struct engine *en, const char *const *keys,
         return err_set(e, "%s: out of memory", en->file);
     char *at = (char *)(*argv + num + 1), **next = *argv;
     for (; *keys != NULL; keys++)
-        json_array_foreach(json_object_get(en->json, *keys), i, arg)
-        {
+        json_array_foreach(json_object_get(en->json, *keys), i, arg) {
             size_t n = fill_in(json_string_value(arg), values, at, bytes, &missing);
             *next++ = at;
             at += n;

@@ -3,12 +3,12 @@
 #include "engine_internal.h"
 
 #include "reference/replicates/engine_driver.h"
+#include "reference/base/json_node.h"
 #include "reference/base/process.h"
 #include "reference/base/utc_date.h"
 
 #include "renderer/base/fs.h"
 #include "renderer/base/sha256.h"
-#include "renderer/base/shell_quote.h"
 
 #include <errno.h>
 #include <stdio.h>
@@ -113,24 +113,12 @@ static json_t *seeds_of(const struct engine_job *j)
     return seeds;
 }
 
-/* In words that shell_quote_split() reads back. */
-static char *command_line(const json_t *args)
-{
-    size_t num = json_array_size(args);
-    const char **word = calloc(num + 1, sizeof *word);
-    for (size_t i = 0; word != NULL && i < num; i++)
-        word[i] = json_string_value(json_array_get(args, i));
-    char *text = word != NULL ? shell_quote_join(NULL, word) : NULL;
-    free(word);
-    return text;
-}
-
 bool engine_describe(const struct engine_job *j, const struct moments *m, double wall_s,
                      json_t **manifest, struct err *e)
 {
     char version[256], binary[65], description[65];
     json_t *files = json_object();
-    char *command = command_line(json_object_get(j->en->json, "command"));
+    char *command = json_command_line(NULL, json_object_get(j->en->json, "command"));
     bool ok = (command != NULL || err_set(e, "out of memory")) && read_version(j, version, e) &&
               sha256_file(j->program, binary, e) && sha256_file(j->en->file, description, e) &&
               hash_files(j->en, files, e);

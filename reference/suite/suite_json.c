@@ -83,8 +83,7 @@ static bool read_references(const char *file, json_t *object, struct suite_scene
 {
     const char *engine;
     json_t *value;
-    json_object_foreach(object, engine, value)
-    {
+    json_object_foreach(object, engine, value) {
         struct suite_reference r = {0};
         if (!read_reference(file, engine, value, &r, e))
             return false;
@@ -157,8 +156,7 @@ static bool read_variant(const char *file, int i, json_t *object, struct suite_v
     snprintf(v->name, sizeof v->name, "pathtracer-%s", name);
     if (json_array_size(options) == 0 || json_array_size(options) > most)
         return err_set(e, "%s: '%soptions' is not an array of 1 to %zu texts", file, at, most);
-    json_array_foreach(options, k, option)
-    {
+    json_array_foreach(options, k, option) {
         v->options[k] = json_string_value(option);
         if (v->options[k] == NULL)
             return err_set(e, "%s: '%soptions' holds what is not a text", file, at);
@@ -174,8 +172,7 @@ static bool read_variants(const struct json_node *n, struct suite_scene *s, stru
         return true;
     if (json_array_size(array) == 0 || json_array_size(array) > MAX_VARIANTS)
         return err_set(e, "%s: 'variants' is not an array of 1 to %d", n->file, MAX_VARIANTS);
-    json_array_foreach(array, i, value)
-    {
+    json_array_foreach(array, i, value) {
         if (!read_variant(n->file, (int)i, value, &s->variant[i], e))
             return false;
         s->num_variants++;
@@ -231,8 +228,7 @@ static bool read_not_expressible(const struct json_node *n, struct suite_scene *
         return false;
     const char *engine;
     json_t *value;
-    json_object_foreach(s->not_expressible, engine, value)
-    {
+    json_object_foreach(s->not_expressible, engine, value) {
         char reason[256];
         if (!json_get_text(&reasons, engine, reason, sizeof reason, e))
             return false;

@@ -123,10 +123,9 @@ static bool read_reference(const struct json_node *n, const char *name, struct s
 /* Those of the suite and of the scene in one object: of what both name, the scene's members count. null: not of this scene. */
 static json_t *merge_references(const json_t *of_suite, const json_t *of_scene)
 {
-    json_t *all = json_deep_copy(of_suite), *value;
+    json_t *all = of_suite != NULL ? json_deep_copy(of_suite) : json_object(), *value;
     const char *name;
-    json_object_foreach((json_t *)of_scene, name, value)
-    {
+    json_object_foreach((json_t *)of_scene, name, value) {
         json_t *mine = json_deep_copy(value);
         if (json_is_object(mine) && json_is_object(json_object_get(all, name)))
             json_object_update_missing(mine, json_object_get(all, name));
@@ -140,8 +139,7 @@ static bool read_references(const struct json_node *scene, struct suite_scene *s
 {
     const char *name;
     json_t *value;
-    json_object_foreach(json_object_get(scene->object, "references"), name, value)
-    {
+    json_object_foreach(json_object_get(scene->object, "references"), name, value) {
         char at[256];
         struct suite_reference r = {.margin_global = global, .margin_tile = tile};
         snprintf(at, sizeof at, "%sreferences.", scene->at);
@@ -241,40 +239,32 @@ static bool read_scenes(const struct json_node *n, const char *dir, json_t *scen
                         struct suite *out, struct err *e)
 {
     double global = 0, tile = 0;
-    json_t *references = json_object_get(n->object, "references"), *value;
+    const json_t *references = json_object_get(n->object, "references");
+    json_t *value;
     const char *name;
     if (!read_margins(n, &global, &tile, e))
         return false;
-    json_t *none = json_object();
-    bool ok = true;
-    json_object_foreach(scenes, name, value)
-    {
+    json_object_foreach(scenes, name, value) {
         char at[256];
         struct suite_scene *s = &out->scene[out->num_scenes++];
         const struct json_node list = {n->file, "scenes.", NULL};
-        ok = check_name(&list, "a scene", name, sizeof s->name, e);
-        if (!ok)
-            break;
+        if (!check_name(&list, "a scene", name, sizeof s->name, e))
+            return false;
         strcpy(s->name, name);
         snprintf(at, sizeof at, "scenes.%s.", name);
         s->json = json_copy(value);
         const struct json_node scene = {n->file, at, s->json};
-        ok = (json_is_object(value) ||
-              err_set(e, "%s: 'scenes.%s' is not an object", n->file, name)) &&
-             (!has(&scene, "references") || json_is_object(json_object_get(value, "references")) ||
-              err_set(e, "%s: 'scenes.%s.references' is not an object", n->file, name));
-        if (!ok)
-            break;
+        if (!json_is_object(value))
+            return err_set(e, "%s: 'scenes.%s' is not an object", n->file, name);
+        if (has(&scene, "references") && !json_is_object(json_object_get(value, "references")))
+            return err_set(e, "%s: 'scenes.%s.references' is not an object", n->file, name);
         if (has(&scene, "references") || !has(&scene, "references_of"))
             json_object_set_new(s->json, "references",
-                                merge_references(references != NULL ? references : none,
-                                                 json_object_get(value, "references")));
-        ok = read_scene(&scene, dir, global, tile, s, e);
-        if (!ok)
-            break;
+                                merge_references(references, json_object_get(value, "references")));
+        if (!read_scene(&scene, dir, global, tile, s, e))
+            return false;
     }
-    json_decref(none);
-    return ok;
+    return true;
 }
 
 bool suite_own_read(const char *dir, struct suite *out, struct err *e)

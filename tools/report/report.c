@@ -268,46 +268,44 @@ bool report_write(const char *results_path, const char *out_path, struct err *e)
     return report_write_with(results_path, NULL, out_path, e);
 }
 
+/* Of checked results. */
+static bool write_file(struct page *page, const json_t *root, const char *path, struct err *e)
+{
+    struct results_walk w = {.results = root};
+    size_t num = json_array_size(json_object_get(root, "claims"));
+    struct out_file out = {0};
+    struct claim_ref *claim = calloc(num + 1, sizeof *claim);
+    if (claim == NULL)
+        return err_set(e, "out of memory for the report");
+    while (results_next(&w) && w.kind == JUDGED_CLAIM)
+        claim[w.index] = (struct claim_ref){w.json, w.index, w.outcome};
+    qsort(claim, num, sizeof *claim, compare_claims);
+    bool ok = fs_make_parent_dirs(path, e) && out_open(&out, path, e);
+    if (ok) {
+        page->f = out.f;
+        ok = write_page(page, root, claim, num, e);
+        if (ok)
+            ok = out_commit(&out, e);
+        else
+            out_abandon(&out);
+    }
+    free(claim);
+    return ok;
+}
+
 bool report_write_with(const char *results_path, const char *converge_path, const char *out_path,
                        struct err *e)
 {
-    bool ok = false;
     struct page page = {0};
-    struct out_file out = {0};
     json_t *root = NULL;
-    struct claim_ref *claim = NULL;
     size_t dir = (size_t)(fs_base(results_path) - results_path);
     if (dir >= sizeof page.dir)
         return err_set(e, "%.64s...: path too long", results_path);
     memcpy(page.dir, results_path, dir);
-
-    if (!results_read(results_path, &root, e))
-        return false;
-    if (converge_path != NULL && !add_convergence(root, results_path, converge_path, e))
-        goto done;
-    const json_t *claims = json_object_get(root, "claims");
-    size_t num = json_array_size(claims);
-    claim = calloc(num + 1, sizeof *claim);
-    if (claim == NULL) {
-        err_set(e, "out of memory for the report");
-        goto done;
-    }
-    for (size_t i = 0; i < num; i++) {
-        claim[i].json = json_array_get(claims, i);
-        claim[i].index = i;
-        claim[i].outcome = results_claim_outcome(claim[i].json);
-    }
-    qsort(claim, num, sizeof *claim, compare_claims);
-    if (!fs_make_parent_dirs(out_path, e) || !out_open(&out, out_path, e))
-        goto done;
-    page.f = out.f;
-    if (write_page(&page, root, claim, num, e))
-        ok = out_commit(&out, e);
-    else
-        out_abandon(&out);
-done:
+    bool ok = results_read(results_path, &root, e) &&
+              (converge_path == NULL || add_convergence(root, results_path, converge_path, e)) &&
+              write_file(&page, root, out_path, e);
     report_pixel_data_free(&page);
-    free(claim);
     json_decref(root);
     return ok;
 }

@@ -189,11 +189,11 @@ static void add_sides(json_t *all, const json_t *rows, const char *key, const ch
     const json_t *c;
     size_t i;
     bool differs = false;
-    json_array_foreach(rows, i, c) differs = differs || is_verdict(c, "verdict", VERDICT_DIFFERENT);
+    json_array_foreach(rows, i, c)
+        differs = differs || is_verdict(c, "verdict", VERDICT_DIFFERENT);
     if (!differs)
         return;
-    json_array_foreach(rows, i, c)
-    {
+    json_array_foreach(rows, i, c) {
         char side[160];
         snprintf(side, sizeof side, "%s-%s", member_text(c, key), kind);
         json_array_append_new(all,
@@ -221,15 +221,13 @@ static const char *accused(const json_t *claims, size_t *length)
     size_t i, k;
     json_t *c, *other;
     int most = 0;
-    json_array_foreach(claims, i, c)
-    {
+    json_array_foreach(claims, i, c) {
         const char *a = member_text(c, "a");
         if (a == NULL)
             continue;
         size_t n = strcspn(a, "-");
         int num = 0;
-        json_array_foreach(claims, k, other)
-        {
+        json_array_foreach(claims, k, other) {
             const char *b = member_text(other, "a");
             num += b != NULL && is_wrongly_different(other) && strcspn(b, "-") == n &&
                    strncmp(a, b, n) == 0;

@@ -35,8 +35,7 @@ void import_result_print(FILE *f, const json_t *reports)
         return;
     }
     fprintf(f, "Blender's own importer against ours:\n");
-    json_array_foreach(reports, i, report)
-    {
+    json_array_foreach(reports, i, report) {
         const char *error = json_string_value(json_object_get(report, "error"));
         const char *what = json_string_value(json_object_get(report, "what"));
         const char *scene = json_string_value(json_object_get(report, "scene"));
@@ -64,8 +63,7 @@ int import_result_exit_code(const json_t *reports)
     int code = EXIT_EQUIVALENT;
     size_t i;
     const json_t *report;
-    json_array_foreach(reports, i, report)
-    {
+    json_array_foreach(reports, i, report) {
         if (json_object_get(report, "absent") != NULL)
             continue;
         if (!json_is_boolean(json_object_get(report, "agrees")))

@@ -1,6 +1,5 @@
 #include "validate_internal.h"
 #include "renderer/base/fs.h"
-#include "renderer/base/shell_quote.h"
 #include "tools/base/data_dirs.h"
 
 #include "tools/compare/hint.h"
@@ -10,42 +9,23 @@
 #include "tools/stats/noise_estimate.h"
 #include "tools/results/results.h"
 
-#include <assert.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-struct words {
-    const char *word[40];
-    char number[12][32];
-    int num, numbers;
-};
-
-static void add_word(struct words *w, const char *option, const char *value)
+/* Takes over the value, which may be NULL. */
+static void add_option(json_t *words, const char *option, json_t *value)
 {
-    assert(w->num + 3 <= (int)(sizeof w->word / sizeof *w->word));
-    w->word[w->num++] = option;
+    json_array_append_new(words, json_string(option));
     if (value != NULL)
-        w->word[w->num++] = value;
-}
-
-__attribute__((format(printf, 3, 4))) static void add_number(struct words *w, const char *option,
-                                                             const char *format, ...)
-{
-    char *text = w->number[w->numbers++];
-    va_list args;
-    va_start(args, format);
-    vsnprintf(text, sizeof *w->number, format, args);
-    va_end(args);
-    add_word(w, option, text);
+        json_array_append_new(words, value);
 }
 
 /* Where it is not the one that is found without being named. */
-static void add_place(struct words *w, const char *option, const char *place, struct path found)
+static void add_place(json_t *words, const char *option, const char *place, struct path found)
 {
     if (place != NULL && strcmp(place, found.s) != 0)
-        add_word(w, option, place);
+        add_option(words, option, json_string(place));
 }
 
 /* The command that judges this claim alone, and yet with the same alpha; to free(). NULL: out of memory. */
@@ -53,34 +33,33 @@ static char *rerun_command(const struct validation *v, const struct claim_run *t
 {
     const struct validate_options *o = v->opt;
     const struct data_dirs at = data_dirs_of_suite(NULL);
-    struct words w = {.num = 0};
     char name[CLAIM_NAME];
     claim_run_name(t, name);
-    add_word(&w, "validate", NULL);
-    add_word(&w, "--only", name);
-    add_number(&w, "--alpha", "%.6g", v->alpha);
     /* The stages of the whole run: the claim's share of alpha alone might ask for two. */
-    add_number(&w, "--stages", "%d", v->stages);
-    add_number(&w, "--seed", "%llu", (unsigned long long)o->seed);
+    json_t *w = json_pack("[s,s,s,s,o,s,o,s,o]", "validate", "--only", name, "--alpha",
+                          json_sprintf("%.6g", v->alpha), "--stages", json_sprintf("%d", v->stages),
+                          "--seed", json_sprintf("%llu", (unsigned long long)o->seed));
     if (o->live)
-        add_word(&w, "--live", NULL);
+        add_option(w, "--live", NULL);
     if (o->live || o->engine != NULL)
-        add_number(&w, "--reference-seed", "%u", o->reference_seed);
+        add_option(w, "--reference-seed", json_sprintf("%u", o->reference_seed));
     if (o->engine != NULL)
-        add_word(&w, "--engine", o->engine->file);
+        add_option(w, "--engine", json_string(o->engine->file));
     if (o->engine_spp > 0)
-        add_number(&w, "--engine-spp", "%d", o->engine_spp);
+        add_option(w, "--engine-spp", json_sprintf("%d", o->engine_spp));
     if (o->engine_replicates > 0)
-        add_number(&w, "--engine-replicates", "%d", o->engine_replicates);
+        add_option(w, "--engine-replicates", json_sprintf("%d", o->engine_replicates));
     if (o->budget_s > 0)
-        add_number(&w, "--budget", "%gs", o->budget_s);
+        add_option(w, "--budget", json_sprintf("%gs", o->budget_s));
     else if (v->sequence != &alpha_spending_single)
-        add_word(&w, "--until-different", NULL);
-    add_place(&w, "--suite", o->suite_dir, at.suite);
-    add_place(&w, "--golden", o->golden_dir, at.golden);
-    add_place(&w, "--share", o->share_dir, at.share);
-    add_place(&w, "--pathtracer", o->pathtracer, at.pathtracer);
-    return shell_quote_join("assay", w.word);
+        add_option(w, "--until-different", NULL);
+    add_place(w, "--suite", o->suite_dir, at.suite);
+    add_place(w, "--golden", o->golden_dir, at.golden);
+    add_place(w, "--share", o->share_dir, at.share);
+    add_place(w, "--pathtracer", o->pathtracer, at.pathtracer);
+    char *command = json_command_line("assay", w);
+    json_decref(w);
+    return command;
 }
 
 static struct claim_context context(const struct validation *v, const struct claim_run *t,

@@ -181,17 +181,21 @@ static void validation_free(struct validation *v)
 }
 
 /* The loader is not believed either: each selected scene, once. */
-static bool check_loader(const struct validation *v, const struct import_options *io,
-                         json_t **loader, struct err *e)
+static bool check_loader(const struct validation *v, json_t *root, struct err *e)
 {
+    const struct import_options io = {.work_dir = v->opt->out_dir,
+                                      .share_dir = v->opt->share_dir,
+                                      .timeout_s = v->opt->timeout_s};
+    json_t *loader;
     /* NOLINTNEXTLINE(bugprone-sizeof-expression): an array of pointers it is. */
     const struct suite_scene **scene = malloc((size_t)v->suite.num_scenes * sizeof *scene);
     int num = 0;
     for (int i = 0; scene != NULL && i < v->suite.num_scenes; i++)
         if (scene_is_selected(v->opt, v->suite.scene[i].name))
             scene[num++] = &v->suite.scene[i];
-    bool ok =
-        (scene != NULL || err_set(e, "out of memory")) && import_check(scene, num, io, loader, e);
+    bool ok = (scene != NULL || err_set(e, "out of memory")) &&
+              import_check(scene, num, &io, &loader, e) &&
+              json_object_set_new(root, "loader", loader) == 0;
     free(scene);
     return ok;
 }
@@ -201,10 +205,11 @@ static json_t *filter_sentence(const struct validation *v)
     char filter[PIXEL_FILTER_TEXT], left_out[256] = "";
     const json_t *count;
     const char *name;
-    json_object_foreach(v->left_out, name, count) snprintf(
-        left_out + strlen(left_out), sizeof left_out - strlen(left_out), "%s%s in %d scenes",
-        left_out[0] != '\0' ? ", " : "; left out, as known for the box of one pixel alone: ", name,
-        (int)json_integer_value(count));
+    json_object_foreach(v->left_out, name, count)
+        snprintf(
+            left_out + strlen(left_out), sizeof left_out - strlen(left_out), "%s%s in %d scenes",
+            left_out[0] != '\0' ? ", " : "; left out, as known for the box of one pixel alone: ",
+            name, (int)json_integer_value(count));
     pixel_filter_print(&v->opt->engine->filter, filter);
     return json_sprintf("%s has the pixel filter %s, and so has what it is held against%s",
                         v->opt->engine->name, filter, left_out);
@@ -224,6 +229,21 @@ static void tell_where(const struct validation *v)
             o->engine != NULL ? ", engine " : "", o->engine != NULL ? o->engine->file : "");
 }
 
+/* What is known before the first look. */
+static void describe(const struct validation *v, json_t *cannot, json_t *root)
+{
+    const struct engine *en = v->opt->engine;
+    if (en != NULL)
+        json_object_set(root, "not_expressible", cannot);
+    if (en != NULL && en->margin_global > 0)
+        json_object_set_new(root, "engine_margin",
+                            json_pack("{ss,sf,sf,ss}", "engine", en->name, "global",
+                                      en->margin_global, "tile", en->margin_tile, "reason",
+                                      en->margin_reason));
+    if (v->left_out != NULL)
+        json_object_set_new(root, "engine_filter", filter_sentence(v));
+}
+
 bool validate(const struct validate_options *opt, int argc, char **argv, json_t **results,
               struct err *e)
 {
@@ -232,44 +252,20 @@ bool validate(const struct validate_options *opt, int argc, char **argv, json_t 
     json_t *root = NULL, *cannot = json_array();
     v.deadline = opt->budget_s > 0 ? v.start + opt->budget_s : INFINITY;
     v.stages = stages_of(opt);
-    if (!suite_load(opt->suite_dir, &v.suite, e)) {
-        json_decref(cannot);
-        return false;
+    bool ok = suite_load(opt->suite_dir, &v.suite, e) && fs_make_dirs(opt->out_dir, e) &&
+              select_claims(&v, cannot, e);
+    if (ok) {
+        tell_where(&v);
+        /* Bonferroni over the claims of this run: one alpha for the whole family. */
+        v.alpha = opt->alpha / (opt->of_claims > 0 ? opt->of_claims : v.num_tasks);
+        ok = validate_start(opt, argc, argv, &root, e);
+        describe(&v, cannot, root);
     }
-    bool ok = fs_make_dirs(opt->out_dir, e) && select_claims(&v, cannot, e);
-    if (!ok)
-        goto done;
-    tell_where(&v);
-    /* Bonferroni over the claims of this run: one alpha for the whole family. */
-    v.alpha = opt->alpha / (opt->of_claims > 0 ? opt->of_claims : v.num_tasks);
-    ok = validate_start(opt, argc, argv, &root, e);
-    if (!ok)
-        goto done;
-    if (opt->engine != NULL)
-        json_object_set(root, "not_expressible", cannot);
-    if (opt->engine != NULL && opt->engine->margin_global > 0)
-        json_object_set_new(root, "engine_margin",
-                            json_pack("{ss,sf,sf,ss}", "engine", opt->engine->name, "global",
-                                      opt->engine->margin_global, "tile", opt->engine->margin_tile,
-                                      "reason", opt->engine->margin_reason));
-    if (v.left_out != NULL)
-        json_object_set_new(root, "engine_filter", filter_sentence(&v));
-    if (opt->live) {
-        const struct import_options io = {
-            .work_dir = opt->out_dir, .share_dir = opt->share_dir, .timeout_s = opt->timeout_s};
-        json_t *loader;
-        ok = check_loader(&v, &io, &loader, e);
-        if (!ok)
-            goto done;
-        json_object_set_new(root, "loader", loader);
+    ok = ok && (!opt->live || check_loader(&v, root, e)) && take_looks(&v, root, e);
+    if (ok) {
+        collect(&v, root);
+        *results = json_incref(root);
     }
-    ok = take_looks(&v, root, e);
-    if (!ok)
-        goto done;
-    collect(&v, root);
-    *results = root;
-    root = NULL;
-done:
     json_decref(root);
     json_decref(cannot);
     validation_free(&v);
