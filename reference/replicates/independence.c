@@ -253,25 +253,19 @@ bool independence_test(const struct replicates *r, double alpha, struct independ
     if (k < FEWEST_REPLICATES)
         return true;
     struct sums s = {.k = k};
-    s.g = calloc(k * k, sizeof *s.g);
-    s.block = malloc(k * k * sizeof *s.block);
-    double *x = malloc(side * side * k * sizeof *x), *sum = malloc(k * sizeof *sum);
-    bool ok = s.g != NULL && s.block != NULL && x != NULL && sum != NULL;
-    if (ok) {
-        add_blocks(&s, r, (int)side, x);
-        out->pixels = s.pixels;
-        for (int i = 0; i < NUM_SQUARES; i++)
-            measure_square(r, 2 << i, x, sum, &out->square_r[i], &out->square_se[i]);
-        if (s.blocks >= FEWEST_BLOCKS)
-            judge(&s, alpha, fmax(r->sharing, 1), out);
-    } else {
-        err_set(e, "independence of replicates: out of memory");
-    }
+    s.g = calloc((2 * k + side * side + 1) * k, sizeof *s.g); /* one block for all */
+    if (s.g == NULL)
+        return err_set(e, "independence of replicates: out of memory");
+    s.block = s.g + k * k;
+    double *x = s.block + k * k, *sum = x + side * side * k;
+    add_blocks(&s, r, (int)side, x);
+    out->pixels = s.pixels;
+    for (int i = 0; i < NUM_SQUARES; i++)
+        measure_square(r, 2 << i, x, sum, &out->square_r[i], &out->square_se[i]);
+    if (s.blocks >= FEWEST_BLOCKS)
+        judge(&s, alpha, fmax(r->sharing, 1), out);
     free(s.g);
-    free(s.block);
-    free(x);
-    free(sum);
-    return ok;
+    return true;
 }
 
 static json_t *to_json(const struct independence *t)

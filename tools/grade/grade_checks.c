@@ -318,25 +318,18 @@ static bool check_equal(const struct work *w, struct result *out, struct err *e)
     const struct moments *plain = &w->g->a->of[0][w->check->images[0]].m;
     const struct submitted_image *s = student(w, 0), *first = s->num_runs > 0 ? s->run : s;
     unsigned char *use = usable(w, out, e);
-    struct submitted_image b;
+    struct submitted_image b = {0};
+    double blind = out->more;
     snprintf(
         out->expected, sizeof out->expected,
         "the mean of the image within %.3g %%, of any 8 x 8 pixels within %.3g %% of the reference",
         100 * w->check->image.full, 100 * w->check->tile.full);
-    if (use == NULL || !submitted_image_from(reference(w, 0), student(w, 0), &b, e)) {
-        free(use);
-        return false;
-    }
-    double blind = out->more;
-    bool ok = compare(w, student(w, 0), &b, use, out, e);
+    bool ok = use != NULL && submitted_image_from(reference(w, 0), student(w, 0), &b, e) &&
+              compare(w, student(w, 0), &b, use, out, e);
     if (ok && out->share < 1 && rubric_is_adaptive(p))
         ok = compare_stopped(w, &b, use, blind, out, e);
-    submitted_image_free(&b);
-    if (!ok) {
-        free(use);
-        return false;
-    }
-    if (is_copy(first, reference(w, 0), p->spp, use) || is_copy(first, plain, p->spp, use)) {
+    if (ok &&
+        (is_copy(first, reference(w, 0), p->spp, use) || is_copy(first, plain, p->spp, use))) {
         out->share = out->chance = 0;
         snprintf(
             out->seen, sizeof out->seen,
@@ -344,20 +337,18 @@ static bool check_equal(const struct work *w, struct result *out, struct err *e)
             p->spp);
         snprintf(out->flag, sizeof out->flag, "%s is a copy of the reference", p->name);
     }
+    submitted_image_free(&b);
     free(use);
-    return true;
+    return ok;
 }
 
 /* A copy of q, moved by the difference of two references, with their noise. */
 static bool moved(const struct submitted_image *q, const struct moments *to,
                   const struct moments *from, struct submitted_image *out, struct err *e)
 {
-    struct submitted_image a, b;
-    if (!submitted_image_from(to, q, &a, e))
-        return false;
-    bool ok = submitted_image_from(from, q, &b, e);
-    if (ok && !(ok = submitted_image_copy(q, out, e)))
-        submitted_image_free(&b);
+    struct submitted_image a = {0}, b = {0};
+    bool ok = submitted_image_from(to, q, &a, e) && submitted_image_from(from, q, &b, e) &&
+              submitted_image_copy(q, out, e);
     for (size_t i = 0; ok && i < 3 * (size_t)q->width * (size_t)q->height; i++) {
         out->mean[i] += a.mean[i] - b.mean[i];
         out->variance[i] += a.variance[i] + b.variance[i];
@@ -365,9 +356,8 @@ static bool moved(const struct submitted_image *q, const struct moments *to,
         if (i % 3 == 1) /* green is most of luminance */
             out->measured[i / 3 * 4 + 3] += a.variance[i] + b.variance[i];
     }
-    if (ok)
-        submitted_image_free(&b);
     submitted_image_free(&a);
+    submitted_image_free(&b);
     return ok;
 }
 
@@ -396,7 +386,7 @@ static bool check_agree(const struct work *w, struct result *out, struct err *e)
 
 static bool check_sum(const struct work *w, struct result *out, struct err *e)
 {
-    struct submitted_image sum;
+    struct submitted_image sum = {0};
     unsigned char *use = usable(w, out, e);
     bool ok = use != NULL && submitted_image_from(NULL, student(w, 0), &sum, e);
     snprintf(out->expected, sizeof out->expected,
@@ -405,12 +395,11 @@ static bool check_sum(const struct work *w, struct result *out, struct err *e)
              100 * w->check->tile.full);
     for (int k = 1; ok && k < w->check->num_images; k++)
         submitted_image_add(&sum, student(w, k));
-    if (ok)
-        submitted_image_unclipped(&sum, use);
     if (ok) {
+        submitted_image_unclipped(&sum, use);
         ok = compare(w, student(w, 0), &sum, use, out, e);
-        submitted_image_free(&sum);
     }
+    submitted_image_free(&sum);
     free(use);
     return ok;
 }
@@ -492,35 +481,28 @@ static bool check_noise(const struct work *w, struct result *out, struct err *e)
         return true;
     }
     unsigned char *use = usable(w, out, e);
-    struct submitted_image rp, rq;
+    struct submitted_image rp = {0}, rq = {0};
     struct interval i;
     struct err why;
-    bool ok = use != NULL && submitted_image_from(reference(w, 0), p, &rp, e);
-    if (ok && !submitted_image_from(reference(w, 1), q, &rq, e)) {
-        submitted_image_free(&rp);
-        ok = false;
-    }
-    if (!ok) {
-        free(use);
-        return false;
-    }
-    if (!difference_related(q, &rq, use)) {
+    bool ok = use != NULL && submitted_image_from(reference(w, 0), p, &rp, e) &&
+              submitted_image_from(reference(w, 1), q, &rq, e);
+    if (ok && !difference_related(q, &rq, use)) {
         snprintf(out->seen, sizeof out->seen, "%s is no image of its scene", image_of(w, 1)->name);
         out->more = 0;
-    } else if (difference_noise(p, &rp, q, &rq, use, w->g->alpha, &i, &why)) {
+    } else if (ok && difference_noise(p, &rp, q, &rq, use, w->g->alpha, &i, &why)) {
         snprintf(out->seen, sizeof out->seen, "%.3g times as much (%.3g to %.3g)", exp(i.value),
                  exp(i.lo), exp(i.hi));
         out->share = 1;
         out->more = 0; /* clipped pixels are left out of it */
         judge(w, &w->check->log_ratio, &i, 0, out);
         settle(w, false, out);
-    } else {
+    } else if (ok) {
         snprintf(out->seen, sizeof out->seen, "%.390s", why.msg);
     }
     submitted_image_free(&rp);
     submitted_image_free(&rq);
     free(use);
-    return true;
+    return ok;
 }
 
 /* By what the rule gives for a program with as much noise: `ours` is the mean of our counts. */
