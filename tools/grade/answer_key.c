@@ -13,7 +13,7 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { MAX_ARGS = 96, TEXT = 8192, MAX_PATH = 8192 };
+enum { MAX_ARGS = 96, TEXT = 8192 };
 
 /* Far from the seeds that submissions get. */
 static const unsigned long long answer_seed = 0x9e3779b97f4a7c15u;
@@ -47,7 +47,7 @@ static bool key_of(const char *const *argv, const char *scene_file, const char *
 {
     char text[TEXT + 512], hash[65], other[65] = "";
     if (!sha256_file(scene_file, hash, e) ||
-        (environment != NULL && !sha256_file(environment, other, e)))
+        (environment[0] != '\0' && !sha256_file(environment, other, e)))
         return false;
     snprintf(text, sizeof text, "%s %s %s", assay_version, hash, other);
     for (const char *const *a = argv + 1; *a != NULL; a++)
@@ -57,18 +57,11 @@ static bool key_of(const char *const *argv, const char *scene_file, const char *
     return true;
 }
 
-static void scene_files(const struct rubric *r, const struct rubric_image *p, char *scene,
-                        char *environment)
+/* "" where it has none. */
+static struct path environment_of(const struct rubric *r, const struct rubric_image *p)
 {
-    environment[0] = '\0';
-    if (p->suite != NULL) {
-        snprintf(scene, MAX_PATH, "%s", p->suite->dae);
-        snprintf(environment, MAX_PATH, "%s", p->suite->environment);
-    } else {
-        snprintf(scene, MAX_PATH, "%s/%s", r->dir, p->scene);
-    }
-    if (p->environment[0] != '\0')
-        snprintf(environment, MAX_PATH, "%s/%s", r->dir, p->environment);
+    return p->environment[0] != '\0' ? fs_path("%s/%s", r->dir, p->environment)
+                                     : fs_path("%s", p->suite != NULL ? p->suite->environment : "");
 }
 
 /* Into `path`, whole or not at all. */
@@ -95,12 +88,12 @@ static bool make_render(const struct rubric *r, const struct rubric_image *p, co
 static bool render_ours(const struct rubric *r, const struct rubric_image *p, const char *words,
                         const struct answer_options *opt, struct moments *out, struct err *e)
 {
-    char text[TEXT], key[65], scene[MAX_PATH], environment[MAX_PATH];
+    char text[TEXT], key[65];
+    const struct path environment = environment_of(r, p);
     const char *argv[MAX_ARGS];
     if (!command_of(r, p, words, opt, "out.exr", text, argv, e))
         return false;
-    scene_files(r, p, scene, environment);
-    if (!key_of(argv, scene, environment[0] != '\0' ? environment : NULL, key, e))
+    if (!key_of(argv, rubric_scene(r, p).s, environment.s, key, e))
         return false;
     const struct path path = fs_path("%s/%s.exr", opt->cache, key);
     if (access(path.s, R_OK) == 0 && moments_read(path.s, out, NULL, e))

@@ -51,13 +51,8 @@ static void look(const struct rubric_image *p, const char *scene, bool holds[NUM
 static char *read_scene(const struct rubric *r, const struct rubric_image *p)
 {
     enum { MOST = 1 << 22 };
-    char path[8192];
-    if (p->suite != NULL)
-        snprintf(path, sizeof path, "%s", p->suite->dae);
-    else
-        snprintf(path, sizeof path, "%s/%s", r->dir, p->scene);
     char *text = calloc(MOST, 1);
-    FILE *f = text != NULL ? fopen(path, "r") : NULL;
+    FILE *f = text != NULL ? fopen(rubric_scene(r, p).s, "r") : NULL;
     if (f != NULL) {
         text[fread(text, 1, MOST - 1, f)] = '\0';
         fclose(f);

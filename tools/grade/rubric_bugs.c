@@ -52,15 +52,10 @@ bool rubric_bugs_key(const struct rubric *r, int set, int image, char name[128],
                      struct err *e)
 {
     const struct rubric_image *p = &r->image[image];
-    char text[4096], path[8192], scene[65], environment[65] = "";
-    if (p->suite != NULL)
-        snprintf(path, sizeof path, "%s", p->suite->dae);
-    else
-        snprintf(path, sizeof path, "%s/%s", r->dir, p->scene);
-    if (!sha256_file(path, scene, e))
-        return false;
-    snprintf(path, sizeof path, "%s/%s", r->dir, p->environment);
-    if (p->environment[0] != '\0' && !sha256_file(path, environment, e))
+    char text[4096], scene[65], environment[65] = "";
+    if (!sha256_file(rubric_scene(r, p).s, scene, e) ||
+        (p->environment[0] != '\0' &&
+         !sha256_file(fs_path("%s/%s", r->dir, p->environment).s, environment, e)))
         return false;
     const char *options = p->reference_options[0] != '\0' ? p->reference_options : p->options;
     const char *words = r->set[set].words;
@@ -223,63 +218,58 @@ static bool look(const struct grading *g, int set, struct sights *out, struct er
     return true;
 }
 
-bool rubric_bugs_diagnose(const struct grading *g, int set, const char *without,
+/* What the images look like with the set of deviations with which they are likeliest: `first`, or another one, unless `only` or where a
+ * single bug explains them with that. */
+static bool likeliest_set(const struct grading *g, int first, bool only,
+                          const struct diagnose_options *opt, struct sights *seen,
                           struct diagnosis *found, int *with, struct err *e)
 {
     const struct catalogue *c = &g->bugs->catalogue;
+    double best = -INFINITY;
+    bool ok = true;
+    for (int k = 0; ok && k < g->r->num_sets && (k == 0 || !only); k++) {
+        int tried = k == 0 ? first : k <= first ? k - 1 : k;
+        struct diagnosis other;
+        ok = look(g, tried, seen, e);
+        if (!ok || seen->num == 0)
+            break;
+        ok = diagnose(c, seen->clue, seen->num, opt, &other, e);
+        bool told =
+            ok && other.num_named > 0 && (!opt->pairs || k == 0 || other.candidate[0].second >= 0);
+        double likelihood =
+            told ? other.log_likelihood + other.candidate[0].log_likelihood : -INFINITY;
+        if (!ok || (k > 0 && !(likelihood > best)))
+            continue;
+        /* Other deviations with a bug have to be likelier than these with none: a bug may be such a deviation. Two at once also
+         * than one with these. */
+        best = told ? likelihood
+                    : other.log_likelihood + (opt->pairs ? fmax(0, other.largest_lead) : 0) +
+                          diagnose_bound(c, g->alpha);
+        *found = other;
+        *with = tried;
+        only = only || (told && k == 0 && !opt->pairs);
+    }
+    return ok;
+}
+
+bool rubric_bugs_diagnose(const struct grading *g, int set, const char *without,
+                          struct diagnosis *found, int *with, struct err *e)
+{
     double clip = rubric_sight_clip(g->r);
     struct diagnose_options opt = {.alpha = g->alpha,
                                    .without = without,
                                    .by_likelihood = true,
                                    .clip = isfinite(clip) ? clip : 0};
     struct sights *seen = calloc(1, sizeof *seen);
-    bool ok = seen != NULL || err_set(e, "out of memory");
-    double best = -INFINITY;
     *found = (struct diagnosis){0};
     *with = set;
-    for (int k = 0; ok && k < g->r->num_sets && !(*with == set && found->num_named > 0); k++) {
-        int tried = k == 0 ? set : k <= set ? k - 1 : k; /* `set` first */
-        struct diagnosis other;
-        ok = look(g, tried, seen, e);
-        if (!ok || seen->num == 0)
-            break;
-        ok = diagnose(c, seen->clue, seen->num, &opt, &other, e);
-        double likelihood = ok && other.num_named > 0
-                                ? other.log_likelihood + other.candidate[0].log_likelihood
-                                : -INFINITY;
-        if (ok && (k == 0 || likelihood > best)) {
-            /* Other deviations with a bug have to be likelier than these with none: a bug may be such a deviation. */
-            best = k == 0 ? other.log_likelihood + diagnose_bound(c, g->alpha) : likelihood;
-            *found = other;
-            *with = tried;
-        }
-    }
-    /* Two at once: with the deviations of a single one that is told, else with any, where they are likelier than one with these. */
-    const bool single = found->num_named > 0;
-    int likely = *with;
+    if (seen == NULL)
+        return err_set(e, "out of memory");
+    bool ok = likeliest_set(g, set, false, &opt, seen, found, with, e);
+    /* Two at once: with the deviations of a single one that is told, else with any. */
     opt.pairs = true;
-    best = -INFINITY;
-    for (int k = 0; ok && k < g->r->num_sets; k++) {
-        int tried = k == 0 ? *with : k <= *with ? k - 1 : k;
-        struct diagnosis two;
-        ok = look(g, tried, seen, e);
-        if (!ok || seen->num == 0 || (single && k > 0))
-            break;
-        ok = diagnose(c, seen->clue, seen->num, &opt, &two, e);
-        double likelihood = ok && two.num_named > 0 && (k == 0 || two.candidate[0].second >= 0)
-                                ? two.log_likelihood + two.candidate[0].log_likelihood
-                                : -INFINITY;
-        if (ok && (k == 0 || likelihood > best)) {
-            best = k == 0 && two.num_named == 0 ? two.log_likelihood + fmax(0, two.largest_lead) +
-                                                      diagnose_bound(c, g->alpha)
-                                                : likelihood;
-            *found = two;
-            likely = tried;
-        }
-    }
-    *with = likely;
-    if (seen != NULL)
-        forget(seen);
+    ok = ok && likeliest_set(g, *with, found->num_named > 0, &opt, seen, found, with, e);
+    forget(seen);
     free(seen);
     return ok;
 }

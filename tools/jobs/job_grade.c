@@ -44,12 +44,10 @@ static bool rubric_inputs(struct plan *p, const struct grade_settings *s, const 
         ok = err_set(e, "%s:%d: %s", s->rubric, m.at[0].line, m.at[0].text);
     for (int i = 0; ok && i < r->num_images; i++) {
         const struct rubric_image *image = &r->image[i];
-        if (image->suite == NULL)
-            ok = beside_rubric(p, r, image->scene, e) && beside_rubric(p, r, image->environment, e);
-        else
-            ok = plan_input(p, image->suite->dae, e) &&
-                 (image->suite->environment[0] == '\0' ||
-                  plan_input(p, image->suite->environment, e));
+        ok = plan_input(p, rubric_scene(r, image).s, e) &&
+             (image->suite == NULL ? beside_rubric(p, r, image->environment, e)
+                                   : image->suite->environment[0] == '\0' ||
+                                         plan_input(p, image->suite->environment, e));
     }
     ok = ok && (s->build_cache == NULL || plan_input(p, s->build_cache, e)) &&
          beside_rubric(p, r, r->bugs, e) && plan_input(p, s->rubric, e) &&

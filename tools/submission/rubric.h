@@ -5,6 +5,7 @@
 #define ASSAY_RUBRIC_H
 
 #include "reference/suite/suite.h"
+#include "renderer/base/fs.h"
 #include "tools/base/sandbox.h"
 
 enum {
@@ -129,6 +130,9 @@ double rubric_option(const struct rubric_image *p, const char *option, int k);
 bool rubric_is_adaptive(const struct rubric_image *p);
 
 double rubric_points(const struct rubric *r);
+
+/* The file of an image's scene. */
+struct path rubric_scene(const struct rubric *r, const struct rubric_image *p);
 
 /* Is pixel number `pixel`, by rows from the top, one that no check looks at? */
 bool rubric_masks(const struct rubric *r, int width, int height, size_t pixel);

@@ -58,6 +58,11 @@ double rubric_points(const struct rubric *r)
     return sum;
 }
 
+struct path rubric_scene(const struct rubric *r, const struct rubric_image *p)
+{
+    return p->suite != NULL ? fs_path("%s", p->suite->dae) : fs_path("%s/%s", r->dir, p->scene);
+}
+
 static bool is_word(const char *word, const char *const *words)
 {
     for (; *words != NULL; words++)

@@ -30,8 +30,7 @@ bool submission_stage(const struct rubric *r, const char *dir, struct err *e)
     chmod(dir, 0755);
     for (int i = 0; i < r->num_images; i++) {
         const struct rubric_image *p = &r->image[i];
-        if (!stage_file(p->suite != NULL ? p->suite->dae : fs_path("%s/%s", r->dir, p->scene).s,
-                        dir, e))
+        if (!stage_file(rubric_scene(r, p).s, dir, e))
             return false;
         if (p->suite != NULL && p->suite->environment[0] != '\0' &&
             !stage_file(p->suite->environment, dir, e))
