@@ -24,15 +24,14 @@ double discrete_build(const double *weight, uint32_t n, uint32_t *end)
 uint32_t discrete_pick(const uint32_t *end, uint32_t n, float u)
 {
     assert(end[n - 1] == DISCRETE_STEPS);
-    uint32_t step = (uint32_t)(u * DISCRETE_STEPS), lo = 0, hi = n - 1;
-    while (lo < hi) {
-        uint32_t mid = lo + (hi - lo) / 2;
-        if (end[mid] > step)
-            hi = mid;
-        else
-            lo = mid + 1;
+    const uint32_t step = (uint32_t)(u * DISCRETE_STEPS), *at = end;
+    /* Without branches on what is found, which no machine can foresee. */
+    while (n > 1) {
+        const uint32_t half = n / 2;
+        at += half & -(uint32_t)(at[half - 1] <= step);
+        n -= half;
     }
-    return lo;
+    return (uint32_t)(at - end);
 }
 
 uint32_t discrete_pick_part(const uint32_t *end, uint32_t n, float u, float *part)

@@ -29,4 +29,24 @@ INLINE void trig_turn(vf v, vf *sine, vf *cosine)
     *sine = as_vf(as_vi(across) ^ (vi)(((vu)quarter & 2) << 30));
 }
 
+/* The angle of (x, y), -pi to pi; relative to its size off by less than 3e-7. */
+INLINE vf trig_atan2(vf y, vf x)
+{
+    const vf zero = vf_set(0), ax = vf_abs(x), ay = vf_abs(y);
+    const vi steep = vf_lt(ax, ay);
+    const vf most = vf_select(steep, ay, ax), least = vf_select(steep, ax, ay);
+    vf t = least / vf_max(most, vf_set(1e-37f));
+    /* tan(pi/8): beyond it an eighth of a turn less. */
+    const vi beyond = vf_lt(vf_set(0.4142135623730950f), t);
+    t = vf_select(beyond, (t - 1) / (t + 1), t);
+    vf z = t * t;
+    vf a = t + t * z *
+                   (-3.33329491539e-1f +
+                    z * (1.99777106478e-1f + z * (-1.38776856032e-1f + z * 8.05374449538e-2f)));
+    a = vf_select(beyond, a + 0.78539816339744830962f, a);
+    a = vf_select(steep, 1.57079632679489661923f - a, a);
+    a = vf_select(vf_lt(x, zero), 3.14159265358979323846f - a, a);
+    return vf_select(vf_lt(y, zero), -a, a);
+}
+
 #endif

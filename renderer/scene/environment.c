@@ -1,34 +1,13 @@
 #include "environment.h"
 
-#include "renderer/math/discrete.h"
-#include "renderer/math/warp.h"
+#include "environment_simd.h"
+#include "renderer/math/mat4.h"
 
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
 static const double PI = 3.14159265358979323846;
-
-struct environment {
-    enum environment_kind kind;
-    rgb radiance; /* not image */
-    double total;
-    /* Image. Cells are `width` columns, of which column c lies between the centres of texels c-1
-     * and c, and height+1 rows, of which the first and the last are half as high. */
-    uint32_t width, height;
-    rgb *texel;
-    double *bound;     /* height+2: sin^2(theta/2) between rows of cells, which is proportional to
-                             the solid angle from the top and exact near both poles */
-    uint32_t *row_end; /* of the choice of a row */
-    uint32_t *column_end; /* width of them per row */
-    float *row_pdf_w;     /* probability of the row over the solid angle of one of its cells */
-};
-
-/* A direction's cell, and where in it: 0 at the centres of texel c-1 and row r-1, 1 at c and r. */
-struct place {
-    uint32_t row, column;
-    float down, right;
-};
 
 static struct environment *new_environment(enum environment_kind kind, struct err *e)
 {
@@ -65,10 +44,14 @@ void environment_free(struct environment *env)
     if (env == NULL)
         return;
     free(env->texel);
-    free(env->bound);
+    free(env->begin);
+    free(env->growth);
+    free(env->region_row);
+    free(env->region_column);
+    free(env->region_end);
     free(env->row_end);
-    free(env->column_end);
     free(env->row_pdf_w);
+    free(env->column_end);
     free(env);
 }
 
@@ -97,86 +80,176 @@ static bool copy_texels(struct environment *env, const struct image *im, const c
     return !black || err_set(e, "%s: the environment map is black everywhere", where);
 }
 
-static const rgb *texel_row(const struct environment *env, uint32_t row)
+/* sin^2(theta/2) where row r of cells begins. */
+static double bound(const struct environment *env, uint32_t r)
 {
-    return env->texel + (size_t)env->width * (row < env->height ? row : env->height - 1);
+    double s = sin((r - 0.5) * PI / (2.0 * env->height));
+    return r == 0 ? 0 : r > env->height ? 1 : s * s;
 }
 
-/* The rows of texels above and below a row of cells. */
-static void texel_rows(const struct environment *env, uint32_t row, const rgb **above,
-                       const rgb **below)
+/* Of cell edges: row r begins, column c begins, or somewhere behind that. */
+static dvec3 direction(const struct environment *env, double r, double c)
 {
-    *above = texel_row(env, row > 0 ? row - 1 : 0);
-    *below = texel_row(env, row);
+    double theta = fmin(fmax(r - 0.5, 0), env->height) * PI / env->height,
+           phi = 2 * PI * (c - 0.5) / env->width;
+    return d3(-sin(theta) * cos(phi), cos(theta), sin(theta) * sin(phi));
 }
 
-static uint32_t left_of(const struct environment *env, uint32_t column)
+/* A region: its luminance summed over solid angle, the unit direction of most of it, and how far it goes from there. */
+struct region {
+    double weight, angle;
+    dvec3 middle;
+};
+
+/* The part of cells' luminance that falls on a surface whose normal is anywhere within an angle of one from which light
+ * comes at the cosine x. Positive wherever a part can be, the mean of positive cosines over x - s .. x + s where the
+ * surface's edge may be in sight. */
+static double part_received(double x, double angle)
 {
-    return column > 0 ? column - 1 : env->width - 1;
+    const double s = sin(angle);
+    if (angle >= PI / 2)
+        return (1.1 + x) / 2.1;
+    return x >= s ? x : x > -s ? (x + s) * (x + s) / (4 * s) : 0;
 }
 
-/* The tables of choice. weight has room for a row, row_weight for one number per row. */
-static void build_tables(struct environment *env, double *weight, double *row_weight)
+/* The choice among regions for one rounded normal n. */
+static void build_regions(const struct environment *env, dvec3 n, const struct region *region,
+                          uint32_t *end)
 {
-    uint32_t rows = env->height + 1;
-    for (uint32_t r = 1; r < rows; r++) {
-        double s = sin((r - 0.5) * PI / (2.0 * env->height));
-        env->bound[r] = s * s;
-    }
-    env->bound[0] = 0;
-    env->bound[rows] = 1;
-    for (uint32_t r = 0; r < rows; r++) {
-        const rgb *above, *below;
-        texel_rows(env, r, &above, &below);
-        double cell = 4 * PI * (env->bound[r + 1] - env->bound[r]) / env->width;
-        for (uint32_t c = 0; c < env->width; c++) {
-            uint32_t left = left_of(env, c);
-            weight[c] = 0.25 * cell *
-                        (rgb_luminance(above[left]) + rgb_luminance(above[c]) +
-                         rgb_luminance(below[left]) + rgb_luminance(below[c]));
+    const double spread = asin(0.5 * sqrt(3) / NORMAL_STEPS);
+    double weight[REGION_COLUMNS], rows[REGION_ROWS];
+    n = d3_scale(n, 1 / d3_length(n));
+    for (uint32_t i = 0; i < env->num_rows; i++) {
+        for (uint32_t j = 0; j < env->num_columns; j++) {
+            const struct region *r = &region[i * env->num_columns + j];
+            weight[j] = r->weight * part_received(d3_dot(n, r->middle), r->angle + spread);
         }
-        row_weight[r] =
-            discrete_build(weight, env->width, env->column_end + (size_t)r * env->width);
+        rows[i] =
+            discrete_build(weight, env->num_columns, end + env->num_rows + i * env->num_columns);
     }
-    env->total = discrete_build(row_weight, rows, env->row_end);
+    discrete_build(rows, env->num_rows, end);
+}
+
+/* Middle and angle of region (i, j), the sum over whose rows of luminance times direction is `towards`. Of a region of no more
+ * than a quarter turn the corners are furthest. */
+static void bound_region(const struct environment *env, uint32_t i, uint32_t j, dvec3 towards,
+                         struct region *region)
+{
+    const double length = d3_length(towards);
+    region->angle = PI;
+    region->middle = d3(0, 1, 0);
+    if (!(length > 0) || env->num_columns < 4)
+        return;
+    region->middle = d3_scale(towards, 1 / length);
+    double least = 1;
+    for (uint32_t k = 0; k < 4; k++)
+        least = fmin(least, d3_dot(region->middle, direction(env, env->row_first[i + k / 2],
+                                                             env->column_first[j + k % 2])));
+    region->angle = acos(fmax(-1, least));
+}
+
+/* The tables of choice. weight has room for a row and for a column of cells. */
+static void build_tables(struct environment *env, double *weight, struct region *region)
+{
+    const uint32_t rows = env->height + 1, width = env->width;
     for (uint32_t r = 0; r < rows; r++) {
-        double cell = 4 * PI * (env->bound[r + 1] - env->bound[r]) / env->width;
-        env->row_pdf_w[r] = (float)((double)discrete_probability(env->row_end, r) / cell);
+        /* The bottom row is the top one of a world upside down. */
+        const bool lower = r > env->height / 2;
+        env->begin[r] = (float)(lower ? bound(env, rows - r) : bound(env, r));
+        env->growth[r] = (float)(bound(env, r + 1) - bound(env, r)) * (lower ? -1.0f : 1.0f);
+        env->region_row[r] = (uint8_t)((uint64_t)r * env->num_rows / rows);
+        env->row_first[env->region_row[r] + 1] = r + 1;
+    }
+    for (uint32_t c = 0; c < width; c++) {
+        env->region_column[c] = (uint8_t)((uint64_t)c * env->num_columns / width);
+        env->column_first[env->region_column[c] + 1] = c + 1;
+    }
+    for (uint32_t j = 0; j < env->num_columns; j++) {
+        const uint32_t c0 = env->column_first[j], c1 = env->column_first[j + 1];
+        for (uint32_t i = 0; i < env->num_rows; i++) {
+            const uint32_t r0 = env->row_first[i], r1 = env->row_first[i + 1];
+            struct region *to = &region[i * env->num_columns + j];
+            dvec3 towards = d3(0, 0, 0);
+            for (uint32_t r = r0; r < r1; r++) {
+                const rgb *above = env->texel + (size_t)width * (r > 0 ? r - 1 : 0);
+                const rgb *below = env->texel + (size_t)width * (r < env->height ? r : r - 1);
+                const double cell = 4 * PI * (bound(env, r + 1) - bound(env, r)) / width;
+                for (uint32_t c = c0; c < c1; c++) {
+                    const uint32_t left = c > 0 ? c - 1 : width - 1;
+                    weight[c - c0] = 0.25 * cell *
+                                     (rgb_luminance(above[left]) + rgb_luminance(above[c]) +
+                                      rgb_luminance(below[left]) + rgb_luminance(below[c]));
+                }
+                weight[width + r - r0] =
+                    discrete_build(weight, c1 - c0, env->column_end + (size_t)r * width + c0);
+                towards = d3_sub(towards, d3_scale(direction(env, r + 0.5, 0.5 * (c0 + c1)),
+                                                   -weight[width + r - r0]));
+            }
+            uint32_t *end = env->row_end + (size_t)j * rows + r0;
+            to->weight = discrete_build(weight + width, r1 - r0, end);
+            for (uint32_t r = r0; r < r1; r++)
+                env->row_pdf_w[(size_t)j * rows + r] =
+                    (float)((double)discrete_probability(end, r - r0) * width /
+                            (4 * PI * (bound(env, r + 1) - bound(env, r))));
+            bound_region(env, i, j, towards, to);
+            env->total += to->weight;
+        }
+    }
+    for (int k = 0; k < NORMAL_SIDE * NORMAL_SIDE * NORMAL_SIDE; k++) {
+        const dvec3 n =
+            d3(k / (NORMAL_SIDE * NORMAL_SIDE) - NORMAL_STEPS,
+               k / NORMAL_SIDE % NORMAL_SIDE - NORMAL_STEPS, k % NORMAL_SIDE - NORMAL_STEPS);
+        /* Those that unit vectors round to. */
+        if (fabs(d3_length(n) - NORMAL_STEPS) < 0.5 * sqrt(3))
+            build_regions(env, n, region,
+                          env->region_end + (size_t)k * env->num_rows * (1 + env->num_columns));
     }
 }
 
 struct environment *environment_from_image(const struct image *im, const char *where, struct err *e)
 {
     struct environment *env = new_environment(ENVIRONMENT_IMAGE, e);
-    double *weight = NULL, *row_weight = NULL;
+    double *weight = NULL;
+    struct region *region = NULL;
     bool ok = false;
     if (env == NULL)
         return NULL;
-    if (im->width >= DISCRETE_MOST || im->height >= DISCRETE_MOST) {
+    if (im->width >= DISCRETE_MOST || im->height >= DISCRETE_MOST ||
+        (int64_t)im->width * im->height > INT32_MAX / 2) {
         err_set(e, "%s: %d x %d is too large for an environment map", where, im->width, im->height);
         goto done;
     }
     env->width = (uint32_t)im->width;
     env->height = (uint32_t)im->height;
-    size_t rows = (size_t)env->height + 1;
-    env->texel = calloc((size_t)env->width * env->height, sizeof *env->texel);
-    env->bound = calloc(rows + 1, sizeof *env->bound);
-    env->row_end = calloc(rows, sizeof *env->row_end);
-    env->column_end = calloc(rows * env->width, sizeof *env->column_end);
-    env->row_pdf_w = calloc(rows, sizeof *env->row_pdf_w);
-    weight = calloc(env->width, sizeof *weight);
-    row_weight = calloc(rows, sizeof *row_weight);
-    if (env->texel == NULL || env->bound == NULL || env->row_end == NULL ||
-        env->column_end == NULL || env->row_pdf_w == NULL || weight == NULL || row_weight == NULL) {
+    const size_t rows = (size_t)env->height + 1, columns = env->width;
+    env->num_rows = rows < REGION_ROWS ? (uint32_t)rows : REGION_ROWS;
+    env->num_columns = columns < REGION_COLUMNS ? (uint32_t)columns : REGION_COLUMNS;
+    env->texel =
+        calloc(columns * env->height + 2, sizeof *env->texel); /* two behind are read, too */
+    env->begin = calloc(rows, sizeof *env->begin);
+    env->growth = calloc(rows, sizeof *env->growth);
+    env->region_row = calloc(rows, 1);
+    env->region_column = calloc(columns, 1);
+    env->region_end = calloc((size_t)(NORMAL_SIDE * NORMAL_SIDE * NORMAL_SIDE) * env->num_rows,
+                             (1 + env->num_columns) * sizeof *env->region_end);
+    env->row_end = calloc(rows * env->num_columns, sizeof *env->row_end);
+    env->row_pdf_w = calloc(rows * env->num_columns, sizeof *env->row_pdf_w);
+    env->column_end = calloc(rows * columns, sizeof *env->column_end);
+    weight = calloc(rows + columns, sizeof *weight);
+    region = calloc((size_t)env->num_rows * env->num_columns, sizeof *region);
+    if (env->texel == NULL || env->begin == NULL || env->growth == NULL ||
+        env->region_row == NULL || env->region_column == NULL || env->region_end == NULL ||
+        env->row_end == NULL || env->row_pdf_w == NULL || env->column_end == NULL ||
+        weight == NULL || region == NULL) {
         err_set(e, "%s: out of memory", where);
         goto done;
     }
     ok = copy_texels(env, im, where, e);
     if (ok)
-        build_tables(env, weight, row_weight);
+        build_tables(env, weight, region);
 done:
     free(weight);
-    free(row_weight);
+    free(region);
     if (!ok) {
         environment_free(env);
         env = NULL;
@@ -200,100 +273,24 @@ struct environment *environment_read(const char *path, struct err *e)
     return env;
 }
 
-/* atan2 of lengths is exact near the poles, where acos(y) is not. */
-static struct place find_place(const struct environment *env, vec3 w)
-{
-    double wx = w.x, wz = w.z;
-    double theta = atan2(sqrt(wx * wx + wz * wz), w.y), phi = atan2(-wz, wx) + PI;
-    double x = phi / (2 * PI) * env->width + 0.5, y = theta / PI * env->height + 0.5;
-    uint32_t column = (uint32_t)x, row = (uint32_t)y;
-    if (row > env->height)
-        row = env->height;
-    return (struct place){.row = row,
-                          .column = column % env->width,
-                          .down = (float)(y - row),
-                          .right = (float)(x - column)};
-}
-
-static rgb mix(rgb a, rgb b, float t)
-{
-    return rgb_add(rgb_scale(a, 1 - t), rgb_scale(b, t));
-}
-
-static rgb interpolate(const struct environment *env, const struct place *p)
-{
-    const rgb *above, *below;
-    uint32_t left = left_of(env, p->column);
-    texel_rows(env, p->row, &above, &below);
-    return mix(mix(above[left], above[p->column], p->right),
-               mix(below[left], below[p->column], p->right), p->down);
-}
-
-static float cell_pdf_w(const struct environment *env, uint32_t row, uint32_t column)
-{
-    return env->row_pdf_w[row] *
-           discrete_probability(env->column_end + (size_t)row * env->width, column);
-}
-
 rgb environment_radiance(const struct environment *env, vec3 w)
 {
-    switch (env->kind) {
-    case ENVIRONMENT_CONSTANT: return env->radiance;
-    case ENVIRONMENT_UPPER_HALF: return w.y > 0 ? env->radiance : grey(0);
-    case ENVIRONMENT_IMAGE: {
-        struct place p = find_place(env, w);
-        return interpolate(env, &p);
-    }
-    }
-    return grey(0);
+    return look_up_environment(env, NULL, w, 1, NULL);
 }
 
-static struct environment_sample sample_image(const struct environment *env, const float u[4])
-{
-    struct place p = {.right = u[1]};
-    p.row = discrete_pick(env->row_end, env->height + 1, u[2]);
-    p.column = discrete_pick(env->column_end + (size_t)p.row * env->width, env->width, u[3]);
-    double top = env->bound[p.row], s = top + (double)u[0] * (env->bound[p.row + 1] - top);
-    double sin_theta = 2 * sqrt(s * (1 - s));
-    double phi = 2 * PI * ((double)p.column - 0.5 + (double)u[1]) / env->width;
-    p.down = (float)(2 * asin(sqrt(s)) / PI * env->height + 0.5 - p.row);
-    return (struct environment_sample){
-        .wi = v3((float)(-sin_theta * cos(phi)), (float)(1 - 2 * s), (float)(sin_theta * sin(phi))),
-        .radiance = interpolate(env, &p),
-        .pdf_w = cell_pdf_w(env, p.row, p.column)};
-}
-
-struct environment_sample environment_sample_direction(const struct environment *env,
+struct environment_sample environment_sample_direction(const struct environment *env, vec3 n,
                                                        const float u[4])
 {
-    struct environment_sample s = {.radiance = env->radiance};
-    switch (env->kind) {
-    case ENVIRONMENT_CONSTANT:
-        s.wi = warp_uniform_sphere(u[0], u[1]);
-        s.pdf_w = 0.25f * INV_PI_F;
-        break;
-    case ENVIRONMENT_UPPER_HALF: {
-        vec3 local = warp_uniform_hemisphere(u[0], u[1]);
-        s.wi = v3(local.x, local.z, -local.y);
-        s.pdf_w = warp_uniform_hemisphere_pdf_w(local);
-        break;
-    }
-    case ENVIRONMENT_IMAGE: return sample_image(env, u);
-    }
+    struct environment_sample s;
+    sample_environment_from(env, n, u, 1, &s.wi, &s.radiance, &s.pdf_w);
     return s;
 }
 
-float environment_pdf_w(const struct environment *env, vec3 w)
+float environment_pdf_w(const struct environment *env, vec3 n, vec3 w)
 {
-    switch (env->kind) {
-    case ENVIRONMENT_CONSTANT: return 0.25f * INV_PI_F;
-    case ENVIRONMENT_UPPER_HALF: return w.y > 0 ? 0.5f * INV_PI_F : 0;
-    case ENVIRONMENT_IMAGE: {
-        struct place p = find_place(env, w);
-        return cell_pdf_w(env, p.row, p.column);
-    }
-    }
-    return 0;
+    float pdf_w = 0;
+    look_up_environment(env, &n, w, 1, &pdf_w);
+    return pdf_w;
 }
 
 bool environment_is_hidden(const struct environment *env)

@@ -5,10 +5,10 @@
  *
  * Radiance is interpolated between the centres of texels, around the circle of longitude and
  * constant beyond the centres of the first and last row, so that a coarse map shows no squares to a
- * camera or in a mirror. Directions are chosen among the cells that the centres span, by the mean
- * luminance of a cell's corners times its solid angle, and uniformly in solid angle within the
- * cell. That density is exact, and positive wherever there is light; it is proportional to
- * luminance up to what luminance varies within a cell (a factor of 4 at most). */
+ * camera or in a mirror. Directions are chosen for a surface: first a region of up to 16 x 32, by its luminance times solid
+ * angle times about its cosine with the surface's normal, which is rounded; in it a cell that the centres of texels span, by
+ * the mean luminance of the cell's corners times its solid angle; then uniformly in solid angle within the cell. That density
+ * is exact, and positive wherever light comes to that side. Of a constant, directions are chosen by the cosine. */
 #ifndef ASSAY_ENVIRONMENT_H
 #define ASSAY_ENVIRONMENT_H
 
@@ -54,11 +54,11 @@ struct environment_sample {
     float pdf_w;
 };
 
-/* u in [0,1)^4. */
-struct environment_sample environment_sample_direction(const struct environment *env,
+/* For a surface with the unit normal n. u in [0,1)^4. pdf_w is 0 if no light comes to that side. */
+struct environment_sample environment_sample_direction(const struct environment *env, vec3 n,
                                                        const float u[4]);
 /* Per steradian, for unit w. */
-float environment_pdf_w(const struct environment *env, vec3 w);
+float environment_pdf_w(const struct environment *env, vec3 n, vec3 w);
 
 /* Lights rough surfaces only: neither the camera nor a mirror sees it. */
 bool environment_is_hidden(const struct environment *env);

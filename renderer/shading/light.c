@@ -232,11 +232,11 @@ uint32_t light_count_areas(const struct light_table *t)
     return t->num_areas;
 }
 
-struct light_sample light_sample_direction(const struct light_table *t, uint32_t l, vec3 p,
+struct light_sample light_sample_direction(const struct light_table *t, uint32_t l, vec3 p, vec3 n,
                                            const float u[4])
 {
     struct light_samplev s;
-    sample_light_from(t, l, p, u, 1, &s);
+    sample_light_from(t, l, p, n, u, 1, &s);
     return (struct light_sample){.wi = s.wi,
                                  .distance = s.distance,
                                  .radiance = s.radiance,

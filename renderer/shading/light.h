@@ -44,8 +44,8 @@ struct light_sample {
     bool delta;      /* pdf_w is then 1 and no BSDF sample can find the light */
 };
 
-/* One sample of light number l as seen from p. u in [0,1)^4. */
-struct light_sample light_sample_direction(const struct light_table *t, uint32_t l, vec3 p,
+/* One sample of light number l as seen from p, where the unit normal is n: what the environment goes by. u in [0,1)^4. */
+struct light_sample light_sample_direction(const struct light_table *t, uint32_t l, vec3 p, vec3 n,
                                            const float u[4]);
 
 /* The density with which light l (an area light) would have sampled the place `hit` of primitive

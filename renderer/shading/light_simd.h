@@ -6,7 +6,7 @@
 #include "light_choice_simd.h"
 #include "renderer/math/warp.h"
 #include "renderer/scene/cs184_deviations.h"
-#include "renderer/scene/environment.h"
+#include "renderer/scene/environment_simd.h"
 
 enum {
     /* Up to so many triangles of a light are looked through one by one. */
@@ -20,8 +20,8 @@ enum {
 
 struct light_table {
     const struct scene *scene;
-    float *lamp;     /* records of the triangles of all lights */
-    uint32_t *first; /* by light: its first record */
+    float *lamp;                        /* records of the triangles of all lights */
+    uint32_t *first;                    /* by light: its first record */
     struct light_clusters *all, *delta; /* choices among all lights and among the delta lights */
     uint32_t num_areas;
 };
@@ -245,20 +245,6 @@ INLINE void sample_directional(const struct light *light, struct light_samplev *
     out->delta = vi_set(-1);
 }
 
-INLINE void sample_environment(const struct environment *env, const vf u[4], unsigned mask,
-                               struct light_samplev *out)
-{
-    out->distance = vf_set(INFINITY);
-    for (; mask; mask &= mask - 1) {
-        int i = __builtin_ctz(mask);
-        const float numbers[4] = {LANE(u[0], i), LANE(u[1], i), LANE(u[2], i), LANE(u[3], i)};
-        struct environment_sample s = environment_sample_direction(env, numbers);
-        v3_set_lane(&out->wi, i, s.wi);
-        rgb_set_lane(&out->radiance, i, s.radiance);
-        LANE(out->pdf_w, i) = s.pdf_w;
-    }
-}
-
 /* cs184_deviations.h: the sample as the assignment's starter code makes it of ours. */
 INLINE void as_starter(const struct scene *s, const struct light *light, const struct lamp *l,
                        vec3v p, struct light_samplev *out)
@@ -276,8 +262,8 @@ INLINE void as_starter(const struct scene *s, const struct light *light, const s
 }
 
 /* Samples of light l for the lanes of the mask; the others' are of no use. */
-INLINE void sample_light_from(const struct light_table *t, uint32_t l, vec3v p, const vf u[4],
-                              unsigned mask, struct light_samplev *out)
+INLINE void sample_light_from(const struct light_table *t, uint32_t l, vec3v p, vec3v n,
+                              const vf u[4], unsigned mask, struct light_samplev *out)
 {
     const struct scene *s = t->scene;
     const struct light *light = &s->lights[l];
@@ -302,7 +288,10 @@ INLINE void sample_light_from(const struct light_table *t, uint32_t l, vec3v p, 
     case LIGHT_POINT:
     case LIGHT_SPOT: sample_point(light, p, mask, out); return;
     case LIGHT_DIRECTIONAL: sample_directional(light, out); return;
-    case LIGHT_ENVIRONMENT: sample_environment(s->environment, u, mask, out); return;
+    case LIGHT_ENVIRONMENT:
+        out->distance = vf_set(INFINITY);
+        sample_environment_from(s->environment, n, u, mask, &out->wi, &out->radiance, &out->pdf_w);
+        return;
     }
 }
 

@@ -112,14 +112,14 @@ static __attribute__((noinline)) void sample_chosen(const struct integrator *it,
                                                     int j, struct light_samplev *out)
 {
     const vi chosen = vi_load_any(b->choice + k);
-    const vec3v p = v3_load(&b->p, k);
+    const vec3v p = v3_load(&b->p, k), n = v3_load(&b->ns, k);
     vf u[4];
     load_numbers(b, j, u);
     while (mask) {
         const uint32_t light = b->choice[k + __builtin_ctz(mask)];
         const vi same = vi_eq(chosen, vi_set((int32_t)light));
         struct light_samplev one;
-        sample_light_from(it->lights, light, p, u, mask & bits(same), &one);
+        sample_light_from(it->lights, light, p, n, u, mask & bits(same), &one);
         *out = light_sample_select(same, &one, out);
         mask &= ~bits(same);
     }
@@ -133,7 +133,7 @@ INLINE unsigned sample_light(const struct integrator *it, const struct batch *b,
     if (!what->chosen) {
         vf u[4];
         load_numbers(b, j, u);
-        sample_light_from(it->lights, what->light, v->p, u, mask, ls);
+        sample_light_from(it->lights, what->light, v->p, v->ns, u, mask, ls);
         return mask;
     }
     vf probability = vf_load_any(b->choice_probability + k);
@@ -317,7 +317,9 @@ static __attribute__((noinline)) void connect_hemisphere(const struct integrator
         vi lit = ~missed & vi_lt(vi_set(-1), at.light);
         rgbv le = emitted(s, &at, &b->shadow_hit, k, d, cast & bits(lit));
         if (s->environment != NULL) {
-            le = rgb_select(missed, surroundings(s, d, cast & bits(missed)), le);
+            le = rgb_select(missed,
+                            look_up_environment(s->environment, NULL, d, cast & bits(missed), NULL),
+                            le);
             lit |= missed;
         }
         gather_light(b, k, lanes_of(cast) & lit, rgb_mulv(rgb_load(&b->shadow_light, k), le));

@@ -90,7 +90,7 @@ struct batch {
     struct rgbs shadow_light; /* what the shadow ray brings if nothing is in between */
     bool occluded[BATCH_ROOM];
     struct vec3s p, ng, ns, wo; /* of the hit; normals turned to the side of wo */
-    /* Where the ray comes from, if one of many lights was chosen there: ns, and the weight of all. */
+    /* Where the ray comes from: ns, if light was chosen by it there, and the weight of all of many lights. */
     struct vec3s from_n;
     float from_weight[BATCH_ROOM];
     float eps[BATCH_ROOM];

@@ -38,7 +38,7 @@ static int scatter(const struct integrator *it, struct batch *b, int n, int vert
 {
     const vf zero = vf_set(0);
     int kept = 0;
-    const bool chooses = chooses_light(it);
+    const bool chooses = chooses_light(it), by_normal = chooses || it->scene->environment != NULL;
     const bool two = it->records->only_diffuse && vertex < first_at_risk(&it->opt);
     draw_numbers(it, b, 0, n, (struct draws){vertex + 1, PURPOSE_BSDF, 1, .used = two ? 2 : 4});
     for (int k = 0; k < n; k += LANES) {
@@ -74,8 +74,9 @@ static int scatter(const struct integrator *it, struct batch *b, int n, int vert
         pick_rgb(&b->gathered, kept, rgb_load(&b->gathered, k), order);
         pick_v3(&b->ray.o, kept, o, order);
         pick_v3(&b->ray.d, kept, wi, order);
-        if (chooses) {
+        if (by_normal)
             pick_v3(&b->from_n, kept, v3_load(&b->ns, k), order);
+        if (chooses) {
             vf_store_any(b->from_weight + kept, pick(vf_load_any(b->choice_weight + k), order));
         }
         vf_store_any(b->ray.tmin + kept, zero);

@@ -67,17 +67,6 @@ INLINE rgbv emitted(const struct scene *scene, const struct surfacev *s, const s
     return rgb_where(lanes_of(both_sides) | front, le);
 }
 
-/* Radiance that arrives from outside the scene against d. */
-INLINE rgbv surroundings(const struct scene *s, vec3v d, unsigned mask)
-{
-    rgbv le = rgb_all(grey(0));
-    for (; mask; mask &= mask - 1) {
-        int i = __builtin_ctz(mask);
-        rgb_set_lane(&le, i, environment_radiance(s->environment, v3_lane(&d, i)));
-    }
-    return le;
-}
-
 /* a^2/(a^2 + b^2) by way of b/a: the squares of densities of small lights overflow. */
 INLINE vf power_heuristic(vf a, vf b)
 {
@@ -86,9 +75,9 @@ INLINE vf power_heuristic(vf a, vf b)
 }
 
 /* Weight of emission that the lanes of the mask ran into: of lights of these numbers on surface s, or of the
- * environment (s is NULL). */
+ * environment (s is NULL), whose density is pdf_light. */
 INLINE vf emission_weight(const struct integrator *it, const struct batch *b, int k, unsigned mask,
-                          const int32_t light[LANES], const struct surfacev *s)
+                          const int32_t light[LANES], const struct surfacev *s, vf pdf_light)
 {
     const vf one = vf_set(1), pdf_w = vf_load_any(b->pdf_w + k);
     vi certain = vf_eq(pdf_w, vf_set(0));
@@ -96,20 +85,17 @@ INLINE vf emission_weight(const struct integrator *it, const struct batch *b, in
         return one;
     if (it->opt.direct != DIRECT_MIS)
         return vf_select(certain, one, vf_set(0));
-    vf pdf_light = vf_set(0);
-    vec3v d = v3_load(&b->ray.d, k);
     mask &= ~bits(certain);
     if (s != NULL)
-        pdf_light = pdf_of_light(it->lights, light, b->hit.prim + k, v3_load(&b->ray.o, k), d,
-                                 vf_load_any(b->hit.t + k), s->ng, mask);
-    for (unsigned m = mask; m; m &= m - 1) {
-        int i = __builtin_ctz(m);
-        if (s == NULL)
-            LANE(pdf_light, i) = environment_pdf_w(it->scene->environment, v3_lane(&d, i));
-        if (chooses_light(it))
+        pdf_light = pdf_of_light(it->lights, light, b->hit.prim + k, v3_load(&b->ray.o, k),
+                                 v3_load(&b->ray.d, k), vf_load_any(b->hit.t + k), s->ng, mask);
+    if (chooses_light(it)) {
+        for (unsigned m = mask; m; m &= m - 1) {
+            int i = __builtin_ctz(m);
             LANE(pdf_light, i) *=
                 chosen_probability(it->lights->all, (uint32_t)light[i], vec3s_get(&b->ray.o, k + i),
                                    vec3s_get(&b->from_n, k + i), b->from_weight[k + i]);
+        }
     }
     return vf_select(certain, one,
                      power_heuristic(pdf_w, (float)it->opt.light_samples * pdf_light));
@@ -118,10 +104,12 @@ INLINE vf emission_weight(const struct integrator *it, const struct batch *b, in
 /* Adds what the environment (s is NULL) or the lights whose surfaces the paths of the mask have met send along
  * their rays. */
 static __attribute__((noinline)) void add_emission(const struct integrator *it, struct batch *b,
-                                                   int k, unsigned mask, const struct surfacev *s)
+                                                   int k, unsigned mask, const struct surfacev *s,
+                                                   int vertex)
 {
     const vec3v d = v3_load(&b->ray.d, k);
     int32_t light[LANES];
+    vf pdf_w = vf_set(0);
     rgbv le;
     if (s != NULL) {
         le = emitted(it->scene, s, &b->hit, k, d, mask);
@@ -129,11 +117,13 @@ static __attribute__((noinline)) void add_emission(const struct integrator *it, 
     } else {
         if (environment_is_hidden(it->scene->environment))
             mask &= ~bits(vf_eq(vf_load_any(b->pdf_w + k), vf_set(0)));
-        le = surroundings(it->scene, d, mask);
+        const vec3v n = v3_load(&b->from_n, k);
+        const bool weighs = vertex > 0 && it->opt.direct == DIRECT_MIS;
+        le = look_up_environment(it->scene->environment, weighs ? &n : NULL, d, mask, &pdf_w);
         vi_store_any(light, vi_set(it->scene->environment_light));
     }
     mask &= ~bits(rgb_is_zerov(le));
-    vf w = emission_weight(it, b, k, mask, light, s);
+    vf w = emission_weight(it, b, k, mask, light, s, pdf_w);
     gather_light(b, k, lanes_of(mask), rgb_scalev(rgb_mulv(rgb_load(&b->throughput, k), le), w));
 }
 
@@ -163,7 +153,7 @@ static void shade(const struct integrator *it, struct batch *b, int n, int verte
         vi prim = vi_load_any(b->hit.prim + k);
         unsigned missed = there & bits(vi_eq(prim, vi_set(-1)));
         if (missed && lights_count && it->scene->environment != NULL)
-            add_emission(it, b, k, missed, NULL);
+            add_emission(it, b, k, missed, NULL, vertex);
         there &= ~missed;
         struct surfacev s;
         surfaces(it, &b->ray, &b->hit, k, &s);
@@ -172,7 +162,7 @@ static void shade(const struct integrator *it, struct batch *b, int n, int verte
             if (lit) {
                 /* By way of a copy: what an address is taken of lives in memory for all its life. */
                 const struct surfacev met = s;
-                add_emission(it, b, k, lit, &met);
+                add_emission(it, b, k, lit, &met, vertex);
             }
         }
         b->goes_on[k / LANES] = 0;

@@ -384,7 +384,7 @@ TEST(triangles_of_a_mesh_lamp_by_area)
     int count[N] = {0};
     for (int i = 0; i < STEPS; i++) {
         const float u[4] = {0.3f, 0.4f, ((float)i + 0.5f) / STEPS, 0};
-        struct light_sample l = light_sample_direction(t, 0, v3(20, 0, 0), u);
+        struct light_sample l = light_sample_direction(t, 0, v3(20, 0, 0), v3(0, 1, 0), u);
         int k = (int)floorf(20 + l.wi.x * l.distance);
         assert_in_range(k, 0, N - 1);
         count[k]++;
@@ -536,7 +536,7 @@ TEST(no_light_is_left_out)
             never += probability[l] == 0;
             for (uint32_t i = 0; i < 4; i++) {
                 const struct light_sample ls =
-                    light_sample_direction(t, l, p, sampler_get(12, k, l, i, 0).u);
+                    light_sample_direction(t, l, p, n, sampler_get(12, k, l, i, 0).u);
                 if (!(ls.pdf_w > 0 && dot(ls.wi, n) > 0 && rgb_max(ls.radiance) > 0))
                     continue;
                 found++;
@@ -747,7 +747,7 @@ TEST(triangles_of_a_textured_lamp_by_mean)
     const vec3 from = v3(2, 0, 0);
     for (int i = 0; i < STEPS; i++) {
         const float u[4] = {0.3f, 0.4f, ((float)i + 0.5f) / STEPS, 0};
-        struct light_sample l = light_sample_direction(t, 0, from, u);
+        struct light_sample l = light_sample_direction(t, 0, from, v3(0, 1, 0), u);
         int k = l.pdf_w > 0 ? (int)floorf(from.x + l.wi.x * l.distance) : 0;
         assert_in_range(k, 0, 3);
         count[k]++;

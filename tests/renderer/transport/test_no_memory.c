@@ -170,7 +170,7 @@ static bool sky(const void *arg, double *digest, struct err *e)
         arg != NULL ? environment_read(arg, e) : environment_upper_half((rgb){1, 2, 3}, e);
     if (env == NULL)
         return false;
-    *digest = environment_total(env) + (double)environment_pdf_w(env, v3(0.6f, 0, 0.8f));
+    *digest = environment_total(env) + (double)environment_pdf_w(env, v3(0, 1, 0), v3(0.6f, 0, 0.8f));
     environment_free(env);
     return true;
 }

@@ -1,0 +1,217 @@
+/* Looking up an environment, and choosing directions of it, in lanes. */
+#ifndef ASSAY_ENVIRONMENT_SIMD_H
+#define ASSAY_ENVIRONMENT_SIMD_H
+
+#include "environment.h"
+#include "renderer/math/discrete.h"
+#include "renderer/math/warp.h"
+
+enum {
+    /* At most so many regions of cells, for whose choice there is a table for each of the normals rounded to multiples of
+     * 1/NORMAL_STEPS. */
+    REGION_ROWS = 16,
+    REGION_COLUMNS = 32,
+    NORMAL_STEPS = 3,
+    NORMAL_SIDE = 2 * NORMAL_STEPS + 1
+};
+
+struct environment {
+    enum environment_kind kind;
+    rgb radiance; /* not image */
+    double total;
+    /* Image. Cells are `width` columns, of which column c lies between the centres of texels c-1 and c, and height+1 rows,
+     * of which the first and the last are half as high. */
+    uint32_t width, height;
+    rgb *texel;
+    /* By row of cells: sin^2(theta/2) where it begins, which is proportional to the solid angle from the nearer pole and exact
+     * near it, and what it grows by, with theta from the top in the upper half, from the bottom below it. */
+    float *begin, *growth;
+    uint32_t num_rows, num_columns;      /* of regions */
+    uint8_t *region_row, *region_column; /* by row and by column of cells */
+    uint32_t row_first[REGION_ROWS + 1], column_first[REGION_COLUMNS + 1]; /* and back */
+    uint32_t *
+        region_end; /* by normal: of the choice of a row of regions, then of columns, for each row */
+    uint32_t
+        *row_end; /* by column of regions: of the choice of a row of cells, anew for each region */
+    float
+        *row_pdf_w; /* likewise: probability of the row over the solid angle of one of its cells */
+    uint32_t *column_end; /* `width` of them per row of cells, anew for each region */
+};
+
+/* Cells, and where in them: 0 at the centres of texels c-1 and row r-1, 1 at c and r. */
+struct skyplacev {
+    vi row, column;
+    vf down, right;
+};
+
+INLINE rgbv mixv(rgbv a, rgbv b, vf t)
+{
+    return rgb_addv(rgb_scalev(a, 1 - t), rgb_scalev(b, t));
+}
+
+/* Between four texels. */
+INLINE rgbv sky_radiance(const struct environment *env, const struct skyplacev *p)
+{
+    const vi first = vi_set(0), last = vi_set((int32_t)env->height - 1);
+    const vi rows[2] = {vi_select(vi_lt(first, p->row), p->row - 1, first),
+                        vi_select(vi_lt(last, p->row), last, p->row)};
+    const int32_t width = (int32_t)env->width;
+    const vi columns[2] = {vi_select(vi_lt(first, p->column), p->column, vi_set(width)) - 1,
+                           p->column};
+    rgbv c[4];
+    for (int i = 0; i < 4; i++) {
+        int32_t texel[LANES];
+        vf q[COLUMNS];
+        vi_store_any(texel, rows[i / 2] * width + columns[i % 2]);
+        gather_columns(&env->texel->r, 3, texel, q);
+        c[i] = (rgbv){q[0], q[1], q[2]};
+    }
+    return mixv(mixv(c[0], c[1], p->right), mixv(c[2], c[3], p->right), p->down);
+}
+
+/* Of the unit directions of the mask; the others' is some place. */
+INLINE struct skyplacev sky_place(const struct environment *env, vec3v w, unsigned mask)
+{
+    const int32_t width = (int32_t)env->width, height = (int32_t)env->height;
+    vf theta = trig_atan2(vf_hypot(w.x, w.z), w.y), phi = trig_atan2(-w.z, w.x);
+    vf x = (phi * (0.5f * INV_PI_F) + 0.5f) * (float)width + 0.5f,
+       y = theta * INV_PI_F * (float)height + 0.5f;
+    vi there = lanes_of(mask), row = vi_truncate(y) & there, column = vi_truncate(x) & there;
+    row = vi_select(vi_lt(vi_set(height), row), vi_set(height), row);
+    struct skyplacev p = {.row = row, .down = y - vf_of_int(row), .right = x - vf_of_int(column)};
+    p.column = vi_select(vi_lt(column, vi_set(width)), column, column - width);
+    return p;
+}
+
+/* The table for a normal. */
+INLINE vi sky_table(vec3v n)
+{
+    vi i[3];
+    const vf c[3] = {n.x, n.y, n.z};
+    for (int k = 0; k < 3; k++)
+        i[k] = vi_truncate((c[k] + 1) * (float)NORMAL_STEPS + 0.5f);
+    return (i[0] * NORMAL_SIDE + i[1]) * NORMAL_SIDE + i[2];
+}
+
+static inline const uint32_t *sky_regions(const struct environment *env, int32_t table)
+{
+    return env->region_end + (size_t)table * env->num_rows * (1 + env->num_columns);
+}
+
+/* Density with which the table chooses a cell. */
+static inline float cell_pdf_w(const struct environment *env, int32_t table, uint32_t row,
+                               uint32_t column)
+{
+    const uint32_t *end = sky_regions(env, table), i = env->region_row[row],
+                   j = env->region_column[column];
+    const uint32_t *columns = end + env->num_rows + i * env->num_columns,
+                   first = env->column_first[j];
+    return discrete_probability(end, i) * discrete_probability(columns, j) *
+           env->row_pdf_w[(size_t)j * (env->height + 1) + row] *
+           discrete_probability(env->column_end + (size_t)row * env->width + first, column - first);
+}
+
+/* Chooses a cell; where in it, 0 to 1, and the density: 0, if no light comes to that side. */
+static inline float pick_cell(const struct environment *env, int32_t table, const float u[4],
+                              uint32_t *row, uint32_t *column, float part[2])
+{
+    const uint32_t *end = sky_regions(env, table);
+    if (end[env->num_rows - 1] == 0)
+        return 0;
+    const uint32_t i = discrete_pick_part(end, env->num_rows, u[2], part);
+    const uint32_t j = discrete_pick_part(end + env->num_rows + i * env->num_columns,
+                                          env->num_columns, u[3], part + 1);
+    const uint32_t r = env->row_first[i], c = env->column_first[j];
+    *row = r + discrete_pick(env->row_end + (size_t)j * (env->height + 1) + r,
+                             env->row_first[i + 1] - r, u[0]);
+    *column = c + discrete_pick(env->column_end + (size_t)*row * env->width + c,
+                                env->column_first[j + 1] - c, u[1]);
+    return cell_pdf_w(env, table, *row, *column);
+}
+
+INLINE void sample_sky(const struct environment *env, vec3v n, const vf u[4], unsigned mask,
+                       vec3v *wi, rgbv *radiance, vf *pdf_w)
+{
+    int32_t table[LANES], row[LANES] = {0}, column[LANES] = {0};
+    float part[2][LANES] = {{0}}, begin[LANES] = {0}, growth[LANES] = {0}, pdf[LANES] = {0};
+    vi_store_any(table, sky_table(n));
+    for (; mask; mask &= mask - 1) {
+        const int i = __builtin_ctz(mask);
+        const float numbers[4] = {LANE(u[0], i), LANE(u[1], i), LANE(u[2], i), LANE(u[3], i)};
+        uint32_t r = 0, c = 0;
+        float within[2] = {0, 0};
+        pdf[i] = pick_cell(env, table[i], numbers, &r, &c, within);
+        part[0][i] = within[0];
+        part[1][i] = within[1];
+        row[i] = (int32_t)r;
+        column[i] = (int32_t)c;
+        begin[i] = env->begin[r];
+        growth[i] = env->growth[r];
+    }
+    const float width = (float)env->width, height = (float)env->height;
+    struct skyplacev p = {
+        .row = vi_load_any(row), .column = vi_load_any(column), .right = vf_load_any(part[1])};
+    const vf s = vf_load_any(begin) + vf_load_any(part[0]) * vf_load_any(growth),
+             from_pole = vf_sqrt(s), along = vf_sqrt(1 - s);
+    const vi lower = vi_lt(vi_set((int32_t)env->height / 2), p.row);
+    const vf rows = trig_atan2(from_pole, along) * (2 * INV_PI_F * height), r = vf_of_int(p.row);
+    p.down = vf_select(lower, height - r + 0.5f - rows, rows + 0.5f - r);
+    vf turn = (vf_of_int(p.column) - 0.5f + p.right) / width, sine, cosine,
+       sin_theta = 2 * from_pole * along, y = 1 - 2 * s;
+    trig_turn(vf_select(vf_lt(turn, vf_set(0)), turn + 1, turn), &sine, &cosine);
+    *wi = v3v(-(sin_theta * cosine), vf_negate_if(lower, y), sin_theta * sine);
+    *radiance = sky_radiance(env, &p);
+    *pdf_w = vf_load_any(pdf);
+}
+
+/* Density of a choice by the cosine with n alone, of the upper half of what is up and of the mirror images of what is down. */
+INLINE vf even_sky_pdf_w(const struct environment *env, vec3v n, vec3v w)
+{
+    const vf zero = vf_set(0);
+    vf density = warp_cosine_hemisphere_pdf_w(vf_max(zero, dotv(n, w)));
+    if (env->kind == ENVIRONMENT_CONSTANT)
+        return density;
+    density = density + warp_cosine_hemisphere_pdf_w(vf_max(zero, dotv(n, v3v(w.x, -w.y, w.z))));
+    return vf_select(vf_lt(zero, w.y), density, zero);
+}
+
+/* environment_sample_direction() for the lanes of the mask. */
+INLINE void sample_environment_from(const struct environment *env, vec3v n, const vf u[4],
+                                    unsigned mask, vec3v *wi, rgbv *radiance, vf *pdf_w)
+{
+    if (env->kind == ENVIRONMENT_IMAGE) {
+        sample_sky(env, n, u, mask, wi, radiance, pdf_w);
+        return;
+    }
+    const framev f = frame_from_normalv(n);
+    *wi = frame_to_worldv(&f, warp_cosine_hemisphere(u[0], u[1]));
+    if (env->kind == ENVIRONMENT_UPPER_HALF)
+        wi->y = vf_abs(wi->y);
+    *radiance = rgb_all(env->radiance);
+    *pdf_w = even_sky_pdf_w(env, n, *wi);
+}
+
+/* Radiance from the unit directions of the mask; and the density with which they are chosen at normals n, unless n is NULL. */
+INLINE rgbv look_up_environment(const struct environment *env, const vec3v *n, vec3v w,
+                                unsigned mask, vf *pdf_w)
+{
+    if (env->kind != ENVIRONMENT_IMAGE) {
+        if (n != NULL)
+            *pdf_w = even_sky_pdf_w(env, *n, w);
+        const vi lit = env->kind == ENVIRONMENT_CONSTANT ? vi_set(-1) : vf_lt(vf_set(0), w.y);
+        return rgb_where(lit, rgb_all(env->radiance));
+    }
+    const struct skyplacev p = sky_place(env, w, mask);
+    if (n != NULL) {
+        const vi table = sky_table(*n);
+        *pdf_w = vf_set(0);
+        for (; mask; mask &= mask - 1) {
+            const int i = __builtin_ctz(mask);
+            LANE(*pdf_w, i) = cell_pdf_w(env, LANE(table, i), (uint32_t)LANE(p.row, i),
+                                         (uint32_t)LANE(p.column, i));
+        }
+    }
+    return sky_radiance(env, &p);
+}
+
+#endif
