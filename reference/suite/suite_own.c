@@ -78,26 +78,23 @@ static bool read_text(const struct json_node *n, const char *key, char *out, siz
 static bool read_reference(const struct json_node *n, const char *name, struct suite_scene *s,
                            struct suite_reference *r, struct err *e)
 {
-    static const char *const keys_truth[] = {
-        "class", "margin", "margin_global", "margin_tile", "kind", "values", NULL};
-    static const char *const keys_grid[] = {
-        "class", "margin", "margin_global", "margin_tile", "replicates", "subgrid", NULL};
-    static const char *const keys_ours[] = {"class",       "margin", "margin_global",
-                                            "margin_tile", "spp",    NULL};
-    static const char *const keys[] = {
-        "class", "margin", "margin_global", "margin_tile", "replicates", "spp", NULL};
     const struct engine_kind *kind = engine_with_goldens(name);
     const bool truth = strcmp(name, "truth") == 0, ours = strcmp(name, "pathtracer") == 0;
     const bool grid = kind != NULL && kind->subgrid;
+    const char *const keys[] = {"class",
+                                "margin",
+                                "margin_global",
+                                "margin_tile",
+                                truth  ? "values"
+                                : grid ? "subgrid"
+                                       : "spp",
+                                ours    ? NULL
+                                : truth ? "kind"
+                                        : "replicates",
+                                NULL};
     snprintf(r->engine, sizeof r->engine, "%s", name);
     strcpy(r->fidelity, "exact");
-    if (!json_only_keys(n,
-                        truth  ? keys_truth
-                        : ours ? keys_ours
-                        : grid ? keys_grid
-                               : keys,
-                        e) ||
-        !read_text(n, "class", r->fidelity, sizeof r->fidelity, e) ||
+    if (!json_only_keys(n, keys, e) || !read_text(n, "class", r->fidelity, sizeof r->fidelity, e) ||
         !read_margins(n, &r->margin_global, &r->margin_tile, e))
         return false;
     if (strcmp(r->fidelity, "exact") != 0 && strcmp(r->fidelity, "limit") != 0 &&

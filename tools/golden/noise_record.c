@@ -15,129 +15,107 @@
 #include <string.h>
 #include <unistd.h>
 
-/* k-th of a scene: ours with both samplers, then the engines that it has references of; NULL past the last. */
-static const char *engine_of(const struct suite_scene *scene, int k)
+/* Ours with both samplers, and the engines that the scene has references of. */
+static bool is_of(const struct suite_scene *scene, enum converge_engine engine)
 {
-    for (int i = 0; converge_engine_names[i] != NULL; i++) {
-        const char *name = converge_engine_names[i];
-        if ((i < CONVERGE_REFERENCES || suite_reference_of(scene, name) != NULL) && k-- == 0)
-            return name;
-    }
-    return NULL;
+    return engine < CONVERGE_REFERENCES ||
+           suite_reference_of(scene, converge_engine_names[engine]) != NULL;
 }
 
-static int number_of(const char *engine)
-{
-    int i = 0;
-    while (strcmp(converge_engine_names[i], engine) != 0)
-        i++;
-    return i;
-}
-
-static bool is_halved(const struct suite_scene *s, const char *engine)
-{
-    return engine_with_goldens(engine) != NULL && s->width % 2 == 0 && s->height % 2 == 0 &&
-           s->tile % 2 == 0;
-}
-
-static bool climb(const struct converge_job *job, const char *engine, int rung,
-                  const struct converge_reference *unit, int tile, float *images,
-                  struct noise_ladder *l, char **version, struct err *e)
-{
-    double cpu_s;
-    free(*version);
-    return converge_render(job, (enum converge_engine)number_of(engine), rung,
-                           noise_ladder_spp[rung], images, &cpu_s, version, NULL, e) &&
-           noise_ladder_add(l, images, noise_ladder_spp[rung], cpu_s, unit, job->scene->width, tile,
-                            e);
-}
+/* The noise of one engine, to be recorded. */
+struct recording {
+    const struct reference_command *c;
+    const struct suite_scene *scene;
+    enum converge_engine engine;
+    const char *pathtracer, *made; /* see the header */
+    int shrink;
+    struct converge_reference unit;
+    struct noise_ladder ladder;
+    char *version; /* of another engine, where it says */
+};
 
 /* An engine whose answer has no noise says so; then its ladder has one rung of nothing. */
-static bool render_reference(const struct reference_command *c, const struct suite_scene *scene,
-                             const char *engine, const struct converge_reference *unit, int shrink,
-                             struct noise_ladder *l, char **version, struct err *e)
+static bool render_reference(struct recording *r, struct err *e)
 {
-    struct suite_scene small = *scene;
-    small.width /= shrink;
-    small.height /= shrink;
+    struct suite_scene small = *r->scene;
+    struct noise_ladder *l = &r->ladder;
+    const int tile = r->scene->tile / r->shrink;
+    small.width /= r->shrink;
+    small.height /= r->shrink;
     const struct converge_job job = {.scene = &small,
-                                     .dir = c->work,
-                                     .share_dir = c->opt.share_dir,
-                                     .seed = c->opt.seed,
-                                     .threads = c->opt.threads,
-                                     .timeout_s = c->opt.timeout_s,
+                                     .dir = r->c->work,
+                                     .share_dir = r->c->opt.share_dir,
+                                     .seed = r->c->opt.seed,
+                                     .threads = r->c->opt.threads,
+                                     .timeout_s = r->c->opt.timeout_s,
                                      .replicates = NOISE_REPLICATES};
-    float *images = calloc((size_t)job.replicates * unit->size, sizeof *images);
+    float *images = calloc((size_t)job.replicates * r->unit.size, sizeof *images);
     *l = (struct noise_ladder){.replicates = job.replicates};
     bool ok = images != NULL || err_set(e, "out of memory");
     for (int rung = 0; ok && rung < NOISE_RUNGS; rung++) {
-        ok = climb(&job, engine, rung, unit, scene->tile / shrink, images, l, version, e);
+        const int spp = noise_ladder_spp[rung];
+        double cpu_s;
+        free(r->version);
+        ok = converge_render(&job, r->engine, rung, spp, images, &cpu_s, &r->version, NULL, e) &&
+             noise_ladder_add(l, images, spp, cpu_s, &r->unit, small.width, tile, e);
         if (!ok && rung == 0 && strstr(e->msg, CONVERGE_NO_NOISE) != NULL) {
             e->msg[0] = '\0';
-            ok = noise_ladder_add(l, images, 1, 0, unit, small.width, scene->tile / shrink, e);
+            ok = noise_ladder_add(l, images, 1, 0, &r->unit, small.width, tile, e);
             break;
         }
     }
     free(images);
-    if (!ok)
-        noise_ladder_free(l);
     return ok;
 }
 
-static bool render_ours(const struct reference_command *c, const struct suite_scene *scene,
-                        const char *engine, const char *pathtracer,
-                        const struct converge_reference *unit, struct noise_ladder *l,
-                        struct err *e)
+static bool render_ours(struct recording *r, struct err *e)
 {
-    const struct noise_job job = {.scene = scene,
-                                  .unit = unit,
-                                  .pathtracer = pathtracer,
-                                  .dir = c->work,
-                                  .sobol = number_of(engine) == CONVERGE_SOBOL,
+    const struct noise_job job = {.scene = r->scene,
+                                  .unit = &r->unit,
+                                  .pathtracer = r->pathtracer,
+                                  .dir = r->c->work,
+                                  .sobol = r->engine == CONVERGE_SOBOL,
                                   .replicates = NOISE_RECORD_REPLICATES,
-                                  .threads = c->opt.threads,
-                                  .seed = c->opt.seed,
-                                  .timeout_s = c->opt.timeout_s,
+                                  .threads = r->c->opt.threads,
+                                  .seed = r->c->opt.seed,
+                                  .timeout_s = r->c->opt.timeout_s,
                                   .deadline = INFINITY};
-    struct noise_renders r = {0};
-    bool ok = noise_ladder_render(&job, job.replicates, &r, l, e);
-    noise_ladder_renders_free(&r);
+    struct noise_renders renders = {0};
+    bool ok = noise_ladder_render(&job, job.replicates, &renders, &r->ladder, e);
+    noise_ladder_renders_free(&renders);
     return ok;
 }
 
-/* Adds where it comes from; made: see the header. */
-static void describe(json_t *entry, const struct suite_scene *s, const char *version,
-                     const char *made, uint32_t seed, int shrink)
+/* With where it comes from. */
+static json_t *entry_json(const struct recording *r)
 {
-    json_object_update_new(
-        entry, json_pack("{ss,ss,ss,si,si,si,si,sI,si}", "version", version, "made", made,
-                         "scene_sha256", s->sha256, "width", s->width, "height", s->height, "depth",
-                         s->depth, "tile", s->tile, "seed", (json_int_t)seed, "shrink", shrink));
+    const struct suite_scene *s = r->scene;
+    const char *version = r->engine < CONVERGE_REFERENCES ? assay_version
+                          : r->version != NULL            ? r->version
+                                                          : "?";
+    json_t *entry = noise_ladder_json(&r->ladder);
+    json_object_update_new(entry,
+                           json_pack("{ss,ss,ss,si,si,si,si,sI,si}", "version", version, "made",
+                                     r->made, "scene_sha256", s->sha256, "width", s->width,
+                                     "height", s->height, "depth", s->depth, "tile", s->tile,
+                                     "seed", (json_int_t)r->c->opt.seed, "shrink", r->shrink));
+    return entry;
 }
 
-static bool render_one(const struct reference_command *c, const struct suite_scene *scene,
-                       const char *engine, const char *pathtracer, const char *made, json_t **entry,
-                       struct err *e)
+static bool render_one(struct recording r, json_t **entry, struct err *e)
 {
-    int shrink = is_halved(scene, engine) ? 2 : 1;
-    bool is_ours = number_of(engine) < CONVERGE_REFERENCES;
-    struct converge_reference unit;
-    struct noise_ladder l = {0};
-    char *version = NULL;
-    if ((c->golden == NULL || !noise_ladder_unit(c->golden, scene, shrink, &unit, e)) &&
-        !noise_ladder_unit(c->out, scene, shrink, &unit, e))
+    const struct suite_scene *s = r.scene;
+    const bool is_ours = r.engine < CONVERGE_REFERENCES,
+               halves = s->width % 2 == 0 && s->height % 2 == 0 && s->tile % 2 == 0;
+    r.shrink = !is_ours && halves ? 2 : 1;
+    if ((r.c->golden == NULL || !noise_ladder_unit(r.c->golden, s, r.shrink, &r.unit, e)) &&
+        !noise_ladder_unit(r.c->out, s, r.shrink, &r.unit, e))
         return false;
-    bool ok = is_ours ? render_ours(c, scene, engine, pathtracer, &unit, &l, e)
-                      : render_reference(c, scene, engine, &unit, shrink, &l, &version, e);
-    *entry = ok ? noise_ladder_json(&l) : NULL;
-    describe(*entry, scene,
-             is_ours           ? assay_version
-             : version != NULL ? version
-                               : "?",
-             made, c->opt.seed, shrink);
-    convergence_rate_reference_free(&unit);
-    noise_ladder_free(&l);
-    free(version);
+    bool ok = is_ours ? render_ours(&r, e) : render_reference(&r, e);
+    *entry = ok ? entry_json(&r) : NULL;
+    convergence_rate_reference_free(&r.unit);
+    noise_ladder_free(&r.ladder);
+    free(r.version);
     return ok;
 }
 
@@ -165,15 +143,17 @@ static bool is_there(const char *dir, const struct suite_scene *scene, const cha
 bool noise_record_render(const struct reference_command *c, const struct suite_scene *scene,
                          const char *pathtracer, const char *made, struct err *e)
 {
-    const char *engine;
-    for (int k = 0; (engine = engine_of(scene, k)) != NULL; k++) {
+    for (enum converge_engine k = 0; k < CONVERGE_NUM_ENGINES; k++) {
+        const char *engine = converge_engine_names[k];
         double start = now_seconds();
-        if ((c->engine != NULL && strcmp(c->engine, engine) != 0) ||
+        if (!is_of(scene, k) || (c->engine != NULL && strcmp(c->engine, engine) != 0) ||
             (!c->fresh && (is_there(c->golden, scene, engine) || is_there(c->out, scene, engine))))
             continue;
         fprintf(stderr, "%s: the noise of %s\n", scene->name, engine);
+        const struct recording r = {
+            .c = c, .scene = scene, .engine = k, .pathtracer = pathtracer, .made = made};
         json_t *entry = NULL, *all = noise_ladder_load(c->out, scene->name, e);
-        bool ok = all != NULL && render_one(c, scene, engine, pathtracer, made, &entry, e) &&
+        bool ok = all != NULL && render_one(r, &entry, e) &&
                   json_object_set_new(all, engine, entry) == 0 &&
                   noise_ladder_store(c->out, scene->name, all, e);
         json_decref(all);
@@ -317,11 +297,11 @@ void noise_record_approve(const struct approve_options *opt, const struct suite_
     struct err e = {""};
     json_t *candidate = noise_ladder_load(opt->from_dir, scene->name, &e);
     json_t *all = noise_ladder_load(opt->golden_dir, scene->name, &e);
-    const char *engine;
     bool ok = candidate != NULL && all != NULL;
-    for (int k = 0; ok && (engine = engine_of(scene, k)) != NULL; k++) {
+    for (enum converge_engine k = 0; ok && k < CONVERGE_NUM_ENGINES; k++) {
+        const char *engine = converge_engine_names[k];
         const json_t *entry = json_object_get(candidate, engine);
-        if (entry == NULL)
+        if (entry == NULL || !is_of(scene, k))
             continue;
         enum approval done = approve_one(opt, scene, engine, entry, all, out, &e);
         if (done == APPROVE_IMPOSSIBLE)
@@ -340,10 +320,12 @@ size_t noise_record_status(const char *golden_dir, const struct suite_scene *sce
 {
     struct err e = {""};
     json_t *all = noise_ladder_load(golden_dir, scene->name, &e);
-    const char *engine;
     size_t bad = 0;
-    for (int k = 0; (engine = engine_of(scene, k)) != NULL; k++) {
+    for (enum converge_engine k = 0; k < CONVERGE_NUM_ENGINES; k++) {
+        const char *engine = converge_engine_names[k];
         const json_t *entry = json_object_get(all, engine);
+        if (!is_of(scene, k))
+            continue;
         bool current = all != NULL && is_current(entry, scene, &e);
         fprintf(out, "%-8s %s/noise, %s%s%s\n",
                 current                                         ? "current"
@@ -352,7 +334,7 @@ size_t noise_record_status(const char *golden_dir, const struct suite_scene *sce
                 : strncmp(e.msg, "stale", strlen("stale")) == 0 ? "stale"
                                                                 : "damaged",
                 scene->name, engine, current ? "" : ": ", current ? "" : e.msg);
-        bad += !current && (entry != NULL || number_of(engine) < CONVERGE_REFERENCES);
+        bad += !current && (entry != NULL || k < CONVERGE_REFERENCES);
     }
     json_decref(all);
     return bad;
