@@ -1,7 +1,6 @@
 #include "report.h"
 
 #include "renderer/base/fs.h"
-#include "report_similarity.h"
 #include "tools/html/html.h"
 #include "tools/html/page_assets.h"
 #include "report_internal.h"

@@ -1,6 +1,5 @@
 #include "report_internal.h"
 
-#include "report_similarity.h"
 #include "tools/html/csv_link.h"
 #include "tools/html/html.h"
 #include "tools/plots/plot_interval.h"

@@ -3,6 +3,7 @@
 #define ASSAY_REPORT_INTERNAL_H
 
 #include "renderer/image/moments.h"
+#include "tools/images/flip.h"
 #include "tools/results/results.h"
 
 #include <stdint.h>
@@ -26,13 +27,21 @@ struct claim_ref {
     enum outcome outcome;
 };
 
-/* A claim's row in the table of report_similarity.h, and its packed FLIP map (pixel_codec.h; NULL: none). */
+/* What stands on the page beside the statistics: how alike the two images of a claim look (FLIP), and what another
+ * renderer's test rule would have said of them (idiff). Neither has a part in any verdict. */
+struct similarity {
+    bool has_flip;   /* false where the reference is black */
+    double hdr, ldr; /* mean FLIP; LDR: as the page shows the images at 0 stops */
+    struct flip_exposures exposures;
+    double idiff_percent; /* of the pixels differ by more than Blender's threshold */
+    bool idiff_differs;
+};
+
+/* A claim's row in the table of that, and its packed FLIP map (pixel_codec.h; NULL: none). */
 struct page_alike {
     struct claim_ref claim;
     int width, height;
-    double hdr, ldr; /* NAN: not defined */
-    double idiff_percent;
-    bool idiff_differs;
+    struct similarity is;
     uint8_t *bytes;
     size_t size;
 };
@@ -101,6 +110,19 @@ void report_evidence(FILE *f, const json_t *claim, bool open);
  * in the images, and an empty line for what the page's script reads there. Nothing if no tile has
  * noise. */
 void report_evidence_tiles(FILE *f, const json_t *claim);
+
+/* Compares A with the reference B, radiance `white` being shown as white. map (a float a pixel) receives HDR-FLIP.
+ * Fails only out of memory. */
+bool report_similarity_measure(const struct moments *a, const struct moments *b, double white,
+                               struct similarity *out, float *map, struct err *e)
+    __attribute__((warn_unused_result));
+/* The claim's line, and its place in the table; the map goes into the page as the claim's, for its script, but
+ * for a claim as expected on a page of many. */
+bool report_similarity(struct page *p, const struct claim_ref *claim, const struct moments *a,
+                       const struct moments *b, double white, struct err *e)
+    __attribute__((warn_unused_result));
+/* <section> with the table of all claims that have such a line; nothing without any. */
+void report_similarity_table(const struct page *p);
 
 /* Stated errors ("consistency", stated_error_results.h): how many renderers err as they state, in one line; the table. */
 void report_stated_error_headline(FILE *f, const json_t *consistency);

@@ -1,4 +1,4 @@
-#include "report_similarity.h"
+#include "report_internal.h"
 
 #include "tools/html/plot_colour.h"
 #include "tools/images/idiff.h"
@@ -89,27 +89,18 @@ bool report_similarity(struct page *p, const struct claim_ref *claim, const stru
 {
     struct page_alike *grown = realloc(p->alike, (p->num_alike + 1) * sizeof *grown);
     float *map = malloc((size_t)a->width * (size_t)a->height * sizeof *map);
-    struct similarity l = {0};
+    struct page_alike n = {.claim = *claim, .width = a->width, .height = a->height};
+    const bool left_out = p->folded && claim->outcome == OUTCOME_AS_EXPECTED;
     if (grown != NULL)
         p->alike = grown;
     bool ok = (grown != NULL && map != NULL) || err_set(e, "out of memory for the report");
-    ok = ok && report_similarity_measure(a, b, white, &l, map, e);
+    ok = ok && report_similarity_measure(a, b, white, &n.is, map, e) &&
+         (!n.is.has_flip || left_out ||
+          pixel_codec_encode_map(map, a->width, a->height, &n.bytes, &n.size, e));
     if (ok) {
-        struct page_alike *n = &grown[p->num_alike];
-        *n = (struct page_alike){.claim = *claim,
-                                 .width = a->width,
-                                 .height = a->height,
-                                 .hdr = l.has_flip ? l.hdr : NAN,
-                                 .ldr = l.has_flip ? l.ldr : NAN,
-                                 .idiff_percent = l.idiff_percent,
-                                 .idiff_differs = l.idiff_differs};
-        const bool left_out = p->folded && claim->outcome == OUTCOME_AS_EXPECTED;
-        ok = !l.has_flip || left_out ||
-             pixel_codec_encode_map(map, a->width, a->height, &n->bytes, &n->size, e);
-        p->num_alike += ok;
+        grown[p->num_alike++] = n;
+        write_line(p->f, &n.is);
     }
-    if (ok)
-        write_line(p->f, &l);
     free(map);
     return ok;
 }
@@ -123,12 +114,12 @@ static void write_row(FILE *f, const struct page_alike *n)
                n->claim.index, member_text(c, "scene"), member_text(c, "a"));
     report_reference(f, &n->claim);
     html_print(f, "</td><td>%s", member_text(c, "verdict"));
-    if (isfinite(n->hdr))
-        fprintf(f, "</td><td class=\"num\">%.4f</td><td class=\"num\">%.4f", n->hdr, n->ldr);
+    if (n->is.has_flip)
+        fprintf(f, "</td><td class=\"num\">%.4f</td><td class=\"num\">%.4f", n->is.hdr, n->is.ldr);
     else
         fputs("</td><td class=\"num\">none</td><td class=\"num\">none", f);
-    fprintf(f, "</td><td class=\"num\">%.2f</td><td>%s</td></tr>\n", n->idiff_percent,
-            n->idiff_differs ? "FAIL" : "pass");
+    fprintf(f, "</td><td class=\"num\">%.2f</td><td>%s</td></tr>\n", n->is.idiff_percent,
+            n->is.idiff_differs ? "FAIL" : "pass");
 }
 
 static void write_csv(const struct page *p)
@@ -140,10 +131,10 @@ static void write_csv(const struct page *p)
         static const char *const text[] = {"scene", "a", "b", "verdict"};
         for (size_t k = 0; k < sizeof text / sizeof *text; k++)
             csv_link_text(&csv, member_text(n->claim.json, text[k]));
-        csv_link_number(&csv, n->hdr);
-        csv_link_number(&csv, n->ldr);
-        csv_link_number(&csv, n->idiff_percent);
-        csv_link_text(&csv, n->idiff_differs ? "FAIL" : "pass");
+        csv_link_number(&csv, n->is.has_flip ? n->is.hdr : NAN);
+        csv_link_number(&csv, n->is.has_flip ? n->is.ldr : NAN);
+        csv_link_number(&csv, n->is.idiff_percent);
+        csv_link_text(&csv, n->is.idiff_differs ? "FAIL" : "pass");
         csv_link_line(&csv);
     }
     csv_link_close(&csv);
@@ -157,7 +148,7 @@ void report_similarity_table(const struct page *p)
         return;
     for (size_t i = 0; i < p->num_alike; i++) {
         const char *verdict = member_text(p->alike[i].claim.json, "verdict");
-        bool differs = p->alike[i].idiff_differs;
+        bool differs = p->alike[i].is.idiff_differs;
         equal += strcmp(verdict, "EQUIVALENT") == 0;
         equal_fail += strcmp(verdict, "EQUIVALENT") == 0 && differs;
         different += strcmp(verdict, "DIFFERENT") == 0;

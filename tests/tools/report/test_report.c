@@ -3,7 +3,7 @@
 
 #include "renderer/base/fs.h"
 #include "renderer/image/moments.h"
-#include "tools/report/report_similarity.h"
+#include "tools/report/report_internal.h"
 #include "tools/html/plot_colour.h"
 #include "tools/html/html.h"
 #include "tools/html/page_assets.h"
