@@ -39,14 +39,12 @@ static void remove_old(const char *temp, const char *start)
     DIR *d = opendir(temp);
     struct dirent *entry;
     while (d != NULL && (entry = readdir(d)) != NULL) {
-        char path[PATH_MAX];
         struct err ignored;
-        if (strncmp(entry->d_name, start, length) != 0 ||
-            strlen(entry->d_name) != length + RANDOM ||
-            snprintf(path, sizeof path, "%s/%s", temp, entry->d_name) >= (int)sizeof path)
+        if (strncmp(entry->d_name, start, length) != 0 || strlen(entry->d_name) != length + RANDOM)
             continue;
+        const struct path path = fs_path("%s/%s", temp, entry->d_name);
         int fd;
-        bool removed = lock_dir(path, &fd) == 0 && fs_remove_tree(path, &ignored);
+        bool removed = lock_dir(path.s, &fd) == 0 && fs_remove_tree(path.s, &ignored);
         (void)removed; /* it is in the way of nobody */
         if (fd >= 0)
             close(fd);

@@ -19,15 +19,14 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { MAX_PATH = 4400 };
-
 static bool key_of(const struct grade_job *job, const struct submission *s, char key[65],
                    struct err *e)
 {
-    char rubric[65], scenes[65], bugs[65] = "", appeals[65], path[MAX_PATH], text[1024];
-    snprintf(path, sizeof path, "%.4000s/%s/manifest.json", job->rubric->dir, job->rubric->bugs);
+    char rubric[65], scenes[65], bugs[65] = "", appeals[65], text[1024];
+    const struct path catalogue =
+        fs_path("%s/%s/manifest.json", job->rubric->dir, job->rubric->bugs);
     if (!sha256_file(job->rubric->path, rubric, e) || !hash_tree(job->stage, NULL, scenes, e) ||
-        (job->bugs != NULL && !sha256_file(path, bugs, e)))
+        (job->bugs != NULL && !sha256_file(catalogue.s, bugs, e)))
         return false;
     appeals_key(job->appeals, s->id, appeals);
     snprintf(text, sizeof text, "%s %s %s %s %s %s %llu %.17g %d %d", assay_version, rubric, scenes,
@@ -87,14 +86,11 @@ static json_t *image_json(const struct rubric *r, const struct submitted_images 
 {
     const struct rubric_image *p = &r->image[i];
     const struct made *made = &h->made[i];
-    const char *slash = strrchr(made->path, '/');
     return json_pack("{ss, ss?, ss, ss, sf, sf, si, si, si, ss?}", "name", p->name, "file",
-                     made->path[0] == '\0' ? NULL
-                     : slash != NULL       ? slash + 1
-                                           : made->path,
-                     "why", h->why[i], "end", sandbox_end_name[made->end], "cpu_s", made->cpu_s,
-                     "wall_s", made->wall_s, "width", p->width, "height", p->height, "runs",
-                     h->runs[i], "sha256", h->image[i].mean != NULL ? h->image[i].sha256 : NULL);
+                     made->path[0] == '\0' ? NULL : fs_base(made->path), "why", h->why[i], "end",
+                     sandbox_end_name[made->end], "cpu_s", made->cpu_s, "wall_s", made->wall_s,
+                     "width", p->width, "height", p->height, "runs", h->runs[i], "sha256",
+                     h->image[i].mean != NULL ? h->image[i].sha256 : NULL);
 }
 
 /* Staff are told how far from a decision it is. */

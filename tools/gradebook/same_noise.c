@@ -1,5 +1,6 @@
 #include "same_noise.h"
 
+#include "renderer/base/fs.h"
 #include "student_page.h"
 #include "tools/results/results.h"
 
@@ -185,12 +186,11 @@ static bool read_noise(const char *out, const struct rubric *r, const struct ans
     const struct rubric_image *p = &r->image[i];
     struct submitted_image s;
     struct err why;
-    char path[4600];
-    snprintf(path, sizeof path, "%.4000s/%.128s/%.128s", out, member_or_empty(grade, "id"),
-             member_or_empty(made, "file"));
+    const struct path path =
+        fs_path("%s/%s/%s", out, member_or_empty(grade, "id"), member_or_empty(made, "file"));
     if (!is_right(grade, p->name) || member_or_empty(made, "file")[0] == '\0')
         return true;
-    if (!submitted_image_read(path, r->curve, p->width, p->height, &s, &why))
+    if (!submitted_image_read(path.s, r->curve, p->width, p->height, &s, &why))
         return !err_is_of_memory(&why) || err_set(e, "%s", why.msg);
     int set = answer_key_set(r, member_or_empty(grade, "accepted"));
     bool ok = same_noise_of(&s, answer_key_image(a, set, i), p->spp, noise, e);
