@@ -1,6 +1,7 @@
 #include "moments.h"
 
 #include "renderer/base/huge_alloc.h"
+#include "renderer/base/isa.h"
 
 #include <assert.h>
 #include <float.h>
@@ -319,8 +320,8 @@ static bool read_head(const char *path, struct image_reader *r, struct moments *
 }
 
 /* Row y, whose channels begin at `row`. */
-static bool take_row(const char *path, struct moments *m, const int at[10], size_t y,
-                     const float *row, struct err *e)
+ISA_CLONES static bool take_row(const char *path, struct moments *m, const int at[10], size_t y,
+                                const float *row, struct err *e)
 {
     double *const out[4] = {m->mean, m->m2, m->m3, m->n};
     float *const packed[4] = {m->packed.mean, m->packed.m2, m->packed.m3, m->packed.n};

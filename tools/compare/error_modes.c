@@ -54,18 +54,22 @@ ISA_CLONES static void fill_side(const struct error_modes *modes, struct error_m
 {
     const struct moments *m = modes->side[side];
     const bool exact = strcmp(m->unit, "exact") == 0;
-    const int x = f->x > 0 ? f->x : 0, right = f->x + f->across,
-              num = (right < modes->width ? right : modes->width) - x;
-    const size_t room = f->room, row = (size_t)f->across * sizeof *f->data;
+    const int x = f->x > 0 ? f->x : 0, right = f->x + f->across;
+    const size_t room = f->room, left = (size_t)(x - f->x);
     for (int y = f->y; y < f->y + f->down; y++) {
+        const bool is_inside = y >= 0 && y < modes->height;
+        const int end = right < modes->width ? right : modes->width;
+        const size_t num = is_inside ? (size_t)(end - x) : 0, rest = (size_t)f->across - left - num;
         const size_t to = error_modes_at(f, x, y),
                      from = (size_t)y * (size_t)modes->width + (size_t)x;
         double *sd = f->sd[side] + to, *mean = f->mean[side] + to, *count = f->n[side] + to;
-        for (size_t c = 0; c < 3; c++) {
-            memset(sd + c * room - (x - f->x), 0, row);
-            memset(mean + c * room - (x - f->x), 0, row);
+        for (size_t c = 0; c < 3 * room; c += room) {
+            memset(sd + c - left, 0, left * sizeof *sd);
+            memset(sd + c + num, 0, rest * sizeof *sd);
+            memset(mean + c - left, 0, left * sizeof *mean);
+            memset(mean + c + num, 0, rest * sizeof *mean);
         }
-        for (size_t i = 0; y >= 0 && y < modes->height && i < (size_t)num; i++) {
+        for (size_t i = 0; i < num; i++) {
             double n = moments_n(m, from + i), v = exact ? 0 : 1 / (n * (n - 1));
             count[i] = n;
             for (size_t c = 0; c < 3; c++) {
@@ -73,9 +77,9 @@ ISA_CLONES static void fill_side(const struct error_modes *modes, struct error_m
                 sd[c * room + i] = moments_m2(m, 3 * (from + i) + c) * v;
             }
         }
-        for (size_t c = 0; c < 3; c++)
-            for (size_t i = 0; i < (size_t)num; i++)
-                sd[c * room + i] = sqrt(sd[c * room + i]);
+        for (size_t c = 0; c < 3 * room; c += room)
+            for (size_t i = 0; i < num; i++)
+                sd[c + i] = sqrt(sd[c + i]);
     }
 }
 

@@ -98,9 +98,8 @@ static const struct value *strip_at(const struct images *m, const struct change 
 }
 
 /* B between two pixels. False where it would come from beyond the border. */
-static inline __attribute__((always_inline)) bool shifted(const struct images *m,
-                                                          const struct change *how, size_t k, int x,
-                                                          int y, struct value out[3])
+static bool shifted(const struct images *m, const struct change *how, size_t k, int x, int y,
+                    struct value out[3])
 {
     const bool down = how->kind == ERROR_SHIFT_Y;
     double from = (down ? y : x) - how->amount, low = floor(from), share = from - low;
@@ -117,10 +116,8 @@ static inline __attribute__((always_inline)) bool shifted(const struct images *m
 }
 
 /* B, changed: mean and variance. `own`: what it was; k: number of its block in the sample. */
-static inline __attribute__((always_inline)) bool changed(const struct images *m,
-                                                          const struct change *how, size_t k, int x,
-                                                          int y, const struct value own[3],
-                                                          struct value out[3])
+static bool changed(const struct images *m, const struct change *how, size_t k, int x, int y,
+                    const struct value own[3], struct value out[3])
 {
     static const size_t from[NUM_ERROR_MODES][3] = {
         [ERROR_SWAP_RB] = {2, 1, 0}, [ERROR_SWAP_RG] = {1, 0, 2}, [ERROR_SWAP_GB] = {0, 2, 1}};
@@ -151,10 +148,8 @@ static inline __attribute__((always_inline)) bool changed(const struct images *m
 }
 
 /* Block number k of the sample, whose first pixel is number *first; then that of the next. */
-static inline __attribute__((always_inline)) void add_block(const struct images *m,
-                                                            const struct change *how, size_t k,
-                                                            int column, int row, size_t *first,
-                                                            struct excess *out)
+static void add_block(const struct images *m, const struct change *how, size_t k, int column,
+                      int row, size_t *first, struct excess *out)
 {
     struct excess e = *out; /* in registers */
     const double *weight = m->weight + 3 * ((size_t)row * (size_t)m->columns + (size_t)column);
@@ -191,8 +186,8 @@ static inline __attribute__((always_inline)) void add_block(const struct images 
     *out = e;
 }
 
-static inline __attribute__((always_inline)) struct excess
-measure_as(const struct images *m, enum error_mode_kind kind, double amount, const struct sample *s)
+static struct excess measure(const struct images *m, enum error_mode_kind kind, double amount,
+                             const struct sample *s)
 {
     const struct change how = {kind, amount, exp(amount), s};
     struct excess e = {.of = 0};
@@ -200,23 +195,6 @@ measure_as(const struct images *m, enum error_mode_kind kind, double amount, con
     for (int block = s->step / 2; block < m->columns * m->rows; block += s->step)
         add_block(m, &how, k++, block % m->columns, block / m->columns, &first, &e);
     return e;
-}
-
-/* What is tried most is compiled for itself. */
-static struct excess measure(const struct images *m, enum error_mode_kind kind, double amount,
-                             const struct sample *s)
-{
-    if (kind == ERROR_SCALE)
-        return measure_as(m, ERROR_SCALE, amount, s);
-    if (kind == ERROR_OFFSET)
-        return measure_as(m, ERROR_OFFSET, amount, s);
-    if (kind == ERROR_GAMMA)
-        return measure_as(m, ERROR_GAMMA, amount, s);
-    if (kind == ERROR_SHIFT_X)
-        return measure_as(m, ERROR_SHIFT_X, amount, s);
-    if (kind == ERROR_SHIFT_Y)
-        return measure_as(m, ERROR_SHIFT_Y, amount, s);
-    return measure_as(m, kind, amount, s);
 }
 
 /* At most. */
