@@ -1,10 +1,14 @@
 #include "truth_noise.h"
 
+#include "renderer/base/isa.h"
+
+#include <assert.h>
 #include <gsl/gsl_integration.h>
 #include <jansson.h>
 #include <math.h>
 #include <stdlib.h>
 
+enum { MOST = 48 }; /* of a rule's places along a side */
 static const double max_quadrature_error = 1e-3;
 
 /* With p_l = d^2/(A cos_l) and p_b = cos_p/pi the two densities of a direction to the rectangle, and
@@ -12,26 +16,34 @@ static const double max_quadrature_error = 1e-3;
  * with density p_l, Y_b = w_b where a direction with density p_b meets the rectangle. They are
  * independent, so E[(Y_l + Y_b)^2] = E[Y_l^2] + E[Y_b^2] + 2 E[Y_l] E[Y_b]. All four are integrals over
  * the rectangle, in which a piece dA is the solid angle cos_l dA/d^2. */
-static void moments_by_rule(const struct truth_lamp *l, const gsl_integration_glfixed_table *rule,
-                            double x, double z, double moment[2])
+ISA_CLONES static void moments_by_rule(const struct truth_lamp *l,
+                                       const gsl_integration_glfixed_table *rule, double x,
+                                       double z, double moment[2])
 {
     double area = (l->ex[1] - l->ex[0]) * (l->ez[1] - l->ez[0]);
     double light[2] = {0, 0}, bsdf[2] = {0, 0};
+    double z_of[MOST], weight[MOST], y_l[MOST], w_l[MOST], p_l[MOST], p_b[MOST], piece[MOST];
+    assert(rule->n <= MOST);
+    for (size_t j = 0; j < rule->n; j++)
+        gsl_integration_glfixed_point(l->ez[0], l->ez[1], j, &z_of[j], &weight[j], rule);
     for (size_t i = 0; i < rule->n; i++) {
         double qx, wx;
         gsl_integration_glfixed_point(l->ex[0], l->ex[1], i, &qx, &wx, rule);
         for (size_t j = 0; j < rule->n; j++) {
-            double qz, wz;
-            gsl_integration_glfixed_point(l->ez[0], l->ez[1], j, &qz, &wz, rule);
-            double d2 = (qx - x) * (qx - x) + l->height * l->height + (qz - z) * (qz - z);
+            double d2 = (qx - x) * (qx - x) + l->height * l->height + (z_of[j] - z) * (z_of[j] - z);
             double cosine = l->height / sqrt(d2); /* on both sides */
-            double p_l = d2 / (area * cosine), p_b = cosine / M_PI;
-            double w_l = p_l * p_l / (p_l * p_l + p_b * p_b), w_b = 1 - w_l;
-            double piece = wx * wz * cosine / d2, y_l = p_b * w_l / p_l;
-            light[0] += piece * p_l * y_l;
-            light[1] += piece * p_l * y_l * y_l;
-            bsdf[0] += piece * p_b * w_b;
-            bsdf[1] += piece * p_b * w_b * w_b;
+            p_l[j] = d2 / (area * cosine);
+            p_b[j] = cosine / M_PI;
+            w_l[j] = p_l[j] * p_l[j] / (p_l[j] * p_l[j] + p_b[j] * p_b[j]);
+            piece[j] = wx * weight[j] * cosine / d2;
+            y_l[j] = p_b[j] * w_l[j] / p_l[j];
+        }
+        for (size_t j = 0; j < rule->n; j++) {
+            double w_b = 1 - w_l[j];
+            light[0] += piece[j] * p_l[j] * y_l[j];
+            light[1] += piece[j] * p_l[j] * y_l[j] * y_l[j];
+            bsdf[0] += piece[j] * p_b[j] * w_b;
+            bsdf[1] += piece[j] * p_b[j] * w_b * w_b;
         }
     }
     moment[0] = light[0] + bsdf[0];
