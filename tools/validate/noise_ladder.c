@@ -246,7 +246,7 @@ static bool parse_sample(const json_t *sample, struct noise_ladder *out)
     int x, y;
     if (json_unpack((json_t *)sample, "{s:F,s:i,s:i}", "n", &out->n, "tiles_x", &x, "tiles_y",
                     &y) != 0 ||
-        !(out->n > 0) || x < 1 || y < 1 || x > 4096 || y > 4096 || num != (size_t)(x * y) ||
+        !(out->n > 0) || x < 1 || y < 1 || x > 4096 || y > 4096 || num != (size_t)x * (size_t)y ||
         !parse_estimate(json_object_get(sample, "variance"), &m->image))
         return false;
     m->tiles_x = x;
