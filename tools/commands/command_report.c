@@ -1,8 +1,6 @@
 #include "renderer/base/cli.h"
 #include "renderer/base/fs.h"
 #include "tools/results/github_annotations.h"
-#include "tools/results/noise_results.h"
-#include "tools/results/stated_error_results.h"
 #include "tools/results/convergence_results.h"
 #include "tools/results/history.h"
 #include "tools/results/plain_words.h"
@@ -52,10 +50,7 @@ static void print_markdown(FILE *f, const json_t *results, bool headline)
         github_annotations_headline(f, results);
         fputs("\n\n", f);
     }
-    if (has_claims)
-        results_table_print(f, results, true);
-    stated_error_print(f, json_object_get(results, "consistency"), true);
-    noise_results_print(f, json_object_get(results, "noise"), true);
+    results_table_print(f, results, true);
     if (has_claims && convergence != NULL)
         putc('\n', f);
     if (convergence != NULL)

@@ -1,5 +1,8 @@
 #include "results_table.h"
 
+#include "noise_results.h"
+#include "stated_error_results.h"
+
 #include "tools/compare/region.h"
 
 #include <math.h>
@@ -214,9 +217,11 @@ static void print_errors(FILE *f, const json_t *claims, bool markdown)
 void results_table_print(FILE *f, const json_t *results, bool markdown)
 {
     const json_t *claims = json_object_get(results, "claims");
-    if (markdown)
+    if (json_array_size(claims) > 0 && markdown)
         print_markdown(f, claims);
-    else
+    else if (json_array_size(claims) > 0)
         print_terminal(f, claims);
     print_errors(f, claims, markdown);
+    stated_error_print(f, json_object_get(results, "consistency"), markdown);
+    noise_results_print(f, json_object_get(results, "noise"), markdown);
 }

@@ -35,7 +35,7 @@ extern const size_t results_num_columns;
 bool column_is_number(const struct column *c);
 
 /* Scene, engines, difference with interval, MDB, margin and verdict of every claim, then a line for each that could
- * not be judged; as aligned text or as Markdown. */
+ * not be judged; then what there is of stated errors and of noise; as aligned text or as Markdown. */
 void results_table_print(FILE *f, const json_t *results, bool markdown);
 
 #endif

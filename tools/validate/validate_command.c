@@ -7,8 +7,6 @@
 #include "tools/results/render_cost.h"
 #include "tools/report/report.h"
 #include "tools/results/results_table.h"
-#include "tools/results/noise_results.h"
-#include "tools/results/stated_error_results.h"
 #include "import_result.h"
 #include "shared_features.h"
 
@@ -159,10 +157,7 @@ static bool write_all(const json_t *results, const char *out_dir, bool quiet, st
     if (!json_write(json.s, results, e) || !junit_write(junit.s, results, e) ||
         !report_write(json.s, html.s, e))
         return false;
-    if (json_array_size(json_object_get(results, "claims")) > 0)
-        results_table_print(stdout, results, false);
-    stated_error_print(stdout, json_object_get(results, "consistency"), false);
-    noise_results_print(stdout, json_object_get(results, "noise"), false);
+    results_table_print(stdout, results, false);
     if (member_text(results, "located") != NULL)
         printf("\n%s\n", member_text(results, "located"));
     const json_t *loader = json_object_get(results, "loader");
