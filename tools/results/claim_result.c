@@ -41,17 +41,18 @@ static json_t *statistics_json(const struct comparison *r)
 }
 
 /* Only what is known: a change that removes the difference, a variance ratio with an interval. */
-static json_t *findings_json(const struct comparison *r)
+static bool add_findings(json_t *claim, const struct comparison *r)
 {
     const struct hint *h = &r->hint;
     const struct variance_ratio *v = &r->variance;
-    json_t *hint = NULL, *ratio = NULL;
-    if (h->name != NULL)
-        hint = json_pack("{s:s, s:f, s:f, s:s}", "name", h->name, "removed", h->removed, "amount",
-                         h->amount, "unit", h->unit);
-    if (v->valid)
-        ratio = json_pack("{s:f, s:[f, f]}", "ratio", v->ratio, "ci", v->lo, v->hi);
-    return json_pack("{s:o*, s:o*}", "hint", hint, "variance_ratio", ratio);
+    return (h->name == NULL ||
+            json_object_set_new(claim, "hint",
+                                json_pack("{s:s, s:f, s:f, s:s}", "name", h->name, "removed",
+                                          h->removed, "amount", h->amount, "unit", h->unit)) ==
+                0) &&
+           (!v->valid || json_object_set_new(claim, "variance_ratio",
+                                             json_pack("{s:f, s:[f, f]}", "ratio", v->ratio, "ci",
+                                                       v->lo, v->hi)) == 0);
 }
 
 static const char *unless_empty(const char *text)
@@ -102,7 +103,7 @@ json_t *claim_result_judged(const struct claim_context *c, const struct comparis
                 r->tiles_x, "tiles_y", r->tiles_y, "worst", region_json(&r->worst), "worst_tile",
                 region_json(&r->worst_tile), "tile_log10_p", tile_array(r->tile_log10_p, tiles),
                 "tile_t", tile_array(r->tile_t, tiles), "statistics", statistics_json(r))) == 0 &&
-        json_object_update_new(j, findings_json(r)) == 0;
+        add_findings(j, r);
     if (!ok) {
         json_decref(j);
         j = NULL;
