@@ -1,6 +1,7 @@
 #include "permutation.h"
 
 #include "permutation_table.h"
+#include "renderer/base/isa.h"
 #include "tools/compare/region.h"
 #include "tools/stats/distributions.h"
 
@@ -41,40 +42,47 @@ int permutation_needed(double alpha, int sides)
     return 0;
 }
 
-/* The largest sum of z over the rows of A, either way or in the direction of sign; *where is its region (may be NULL). */
-static double largest_sum(const struct permutation_table *t, const int *row, double *sum,
-                          size_t *where)
+/* The sums of z over the rows of A are the last of num_a rows of `sum`, of which row i has those over the first i + 1 rows;
+ * those before row `first` are there. Returns the largest, either way or in the direction of sign. */
+ISA_CLONES static double largest_sum(const struct permutation_table *t, const int *row, int first,
+                                     double *sum)
 {
-    memcpy(sum, t->z + (size_t)row[0] * t->num, t->num * sizeof *sum);
-    for (int i = 1; i < t->num_a; i++) {
+    enum { LANES = 8 };
+    for (int i = first; i < t->num_a; i++) {
         const double *z = t->z + (size_t)row[i] * t->num;
-        for (size_t r = 0; r < t->num; r++)
-            sum[r] += z[r];
+        double *to = sum + (size_t)i * t->num;
+        if (i == 0)
+            memcpy(to, z, t->num * sizeof *z);
+        for (size_t r = 0; i > 0 && r < t->num; r++)
+            to[r] = to[r - t->num] + z[r];
     }
-    double best = 0;
-    for (size_t r = 0; r < t->num; r++) {
-        double s = t->sign != 0 ? t->sign * sum[r] : fabs(sum[r]);
-        if (r == 0 || s > best) {
-            best = s;
-            if (where != NULL)
-                *where = r;
-        }
-    }
-    return best;
+    sum += (size_t)(t->num_a - 1) * t->num;
+    if (t->sign != 0)
+        return t->sign * sum[0];
+    double best[LANES] = {0};
+    size_t r = 0;
+    for (; r + LANES <= t->num; r += LANES)
+        for (size_t k = 0; k < LANES; k++)
+            best[k] = fabs(sum[r + k]) > best[k] ? fabs(sum[r + k]) : best[k];
+    for (; r < t->num; r++)
+        best[0] = fmax(best[0], fabs(sum[r]));
+    for (size_t k = 1; k < LANES; k++)
+        best[0] = fmax(best[0], best[k]);
+    return best[0];
 }
 
-/* Next subset of num_a of rows in lexicographic order; false after the last. */
-static bool next_subset(int *row, int num_a, int rows)
+/* Next subset of num_a of rows in lexicographic order; the first place that changed, -1 after the last. */
+static int next_subset(int *row, int num_a, int rows)
 {
     int i = num_a - 1;
     while (i >= 0 && row[i] == rows - num_a + i)
         i--;
     if (i < 0)
-        return false;
+        return i;
     row[i]++;
     for (int j = i + 1; j < num_a; j++)
         row[j] = row[j - 1] + 1;
-    return true;
+    return i;
 }
 
 /* splitmix64 */
@@ -114,21 +122,25 @@ static bool run_labellings(const struct permutation_table *t, struct permutation
     out->is_exhaustive = all <= MOST_LABELLINGS;
     out->num_labellings = out->is_exhaustive ? (int)all : MOST_LABELLINGS + 1;
     int *row = malloc((size_t)rows * sizeof *row);
-    double *sum = malloc(t->num * sizeof *sum);
+    double *sum = malloc((size_t)t->num_a * t->num * sizeof *sum);
     *largest = malloc((size_t)out->num_labellings * sizeof **largest);
     bool ok = row != NULL && sum != NULL && *largest != NULL;
     if (ok) {
         for (int k = 0; k < rows; k++)
             row[k] = k; /* the observed labelling */
-        (*largest)[0] = *observed = largest_sum(t, row, sum, where);
+        (*largest)[0] = *observed = largest_sum(t, row, 0, sum);
+        const double *of = sum + (size_t)(t->num_a - 1) * t->num;
+        for (*where = 0; *where + 1 < t->num && fabs(of[*where]) < *observed;)
+            ++*where;
         uint64_t state = 1;
         for (int i = 1; i < out->num_labellings; i++) {
+            int first = 0;
             if (out->is_exhaustive)
-                ok = next_subset(row, t->num_a, rows);
+                first = next_subset(row, t->num_a, rows);
             else
                 random_subset(row, t->num_a, rows, &state);
-            assert(ok);
-            (*largest)[i] = largest_sum(t, row, sum, NULL);
+            assert(first >= 0);
+            (*largest)[i] = largest_sum(t, row, first, sum);
         }
         gsl_sort(*largest, 1, (size_t)out->num_labellings);
     } else {
@@ -292,9 +304,10 @@ bool permutation_confirm(const struct permutation *first, const struct replicate
     struct permutation_table t;
     struct rect rect = {first->x, first->y, first->width, first->height};
     double *largest = NULL, observed = 0;
+    size_t region;
     bool ok = permutation_table_make_one(a2, b2, rect, first->channel, &t, e);
     t.sign = copysign(1, first->difference);
-    ok = ok && run_labellings(&t, out, &largest, NULL, &observed, e);
+    ok = ok && run_labellings(&t, out, &largest, &region, &observed, e);
     if (ok) {
         char where[96];
         out->p =
