@@ -150,11 +150,11 @@ INLINE bool single_descend(const struct wide *w, const struct slabs *b, vf limit
 }
 
 /* A leaf. True: the ray need not go on. */
-INLINE bool single_visit(const struct wide *w, struct single *s, uint32_t ref, bool any)
+INLINE bool single_visit(const struct wide *w, struct single *s, uint32_t ref, vf limit, bool any)
 {
     const struct wide_leaf *l = at(w, ref);
     vf t, u, v;
-    vi met = single_leaf(l, s, ref & WIDE_SPHERES, vf_set(s->limit), &t, &u, &v);
+    vi met = single_leaf(l, s, ref & WIDE_SPHERES, limit, &t, &u, &v);
     if (!bits(met))
         return false;
     if (!any) {
@@ -190,13 +190,16 @@ INLINE void single_alone(const struct wide *w, struct single *s, bool any, struc
     stacked stack[STACK], *top = stack;
     uint32_t ref = next_of(w, (const struct wide_node *)w->arena, s->hit, s->enter, true, &top);
     const struct slabs b = single_slabs(s);
+    vf limit = vf_set(s->limit);
     uint64_t nodes = 0, leaves = 0;
     do {
-        if (!single_descend(w, &b, vf_set(s->limit), &ref, &top, &nodes))
+        if (!single_descend(w, &b, limit, &ref, &top, &nodes))
             continue;
         leaves++;
-        if (single_visit(w, s, ref, any))
+        if (single_visit(w, s, ref, limit, any))
             break;
+        if (!any)
+            limit = vf_set(s->limit);
     } while (single_pop(s, any, stack, &top, &ref));
     stats->box_tests += nodes;
     stats->primitive_tests += leaves;
@@ -216,7 +219,7 @@ INLINE bool way_step(const struct wide *w, struct way *on, bool any, uint64_t *n
     struct single *s = on->s;
     if (on->ref & WIDE_LEAF) {
         ++*leaves;
-        return !single_visit(w, s, on->ref, any) &&
+        return !single_visit(w, s, on->ref, vf_set(s->limit), any) &&
                single_pop(s, any, on->stack, &on->top, &on->ref);
     }
     const struct wide_node *n = (const struct wide_node *)(w->arena + on->ref);
