@@ -173,7 +173,7 @@ static void build_tables(struct environment *env, double *weight, struct region 
             for (uint32_t r = r0; r < r1; r++) {
                 const rgb *above = env->texel + (size_t)width * (r > 0 ? r - 1 : 0);
                 const rgb *below = env->texel + (size_t)width * (r < env->height ? r : r - 1);
-                const double cell = 4 * PI * (bound(env, r + 1) - bound(env, r)) / width;
+                const double cell = 4 * PI * (double)fabsf(env->growth[r]) / width;
                 for (uint32_t c = c0; c < c1; c++) {
                     const uint32_t left = c > 0 ? c - 1 : width - 1;
                     weight[c - c0] = 0.25 * cell *
@@ -190,7 +190,7 @@ static void build_tables(struct environment *env, double *weight, struct region 
             for (uint32_t r = r0; r < r1; r++)
                 env->row_pdf_w[(size_t)j * rows + r] =
                     (float)((double)discrete_probability(end, r - r0) * width /
-                            (4 * PI * (bound(env, r + 1) - bound(env, r))));
+                            (4 * PI * (double)fabsf(env->growth[r])));
             bound_region(env, i, j, towards, to);
             env->total += to->weight;
         }
