@@ -47,7 +47,7 @@ int permutation_needed(double alpha, int sides)
 ISA_CLONES static double largest_sum(const struct permutation_table *t, const int *row, int first,
                                      double *sum)
 {
-    enum { LANES = 8 };
+    enum { STEP = 8 }; /* numbers of the widest vector */
     for (int i = first; i < t->num_a; i++) {
         const double *z = t->z + (size_t)row[i] * t->num;
         double *to = sum + (size_t)i * t->num;
@@ -59,14 +59,14 @@ ISA_CLONES static double largest_sum(const struct permutation_table *t, const in
     sum += (size_t)(t->num_a - 1) * t->num;
     if (t->sign != 0)
         return t->sign * sum[0];
-    double best[LANES] = {0};
+    double best[STEP] = {0};
     size_t r = 0;
-    for (; r + LANES <= t->num; r += LANES)
-        for (size_t k = 0; k < LANES; k++)
+    for (; r + STEP <= t->num; r += STEP)
+        for (size_t k = 0; k < STEP; k++)
             best[k] = fabs(sum[r + k]) > best[k] ? fabs(sum[r + k]) : best[k];
     for (; r < t->num; r++)
         best[0] = fmax(best[0], fabs(sum[r]));
-    for (size_t k = 1; k < LANES; k++)
+    for (size_t k = 1; k < STEP; k++)
         best[0] = fmax(best[0], best[k]);
     return best[0];
 }

@@ -5,6 +5,7 @@
 #include "renderer/base/sha256.h"
 #include "renderer/image/image.h"
 
+#include <assert.h>
 #include <dirent.h>
 #include <errno.h>
 #include <math.h>
@@ -122,10 +123,11 @@ static json_t *facts_json(const double *fact, const double *sd)
     return list;
 }
 
-/* Adds three channels at *next. */
+/* Adds three channels at *next, of x or of xf. */
 static void put(struct image *im, int *next, const char *stem, const double *x, const float *xf,
                 int bits)
 {
+    assert(x != NULL || xf != NULL);
     for (int c = 0; c < 3; c++, (*next)++) {
         snprintf(im->names[*next], sizeof *im->names, "%s.%c", stem, "RGB"[c]);
         for (int i = 0; i < im->width * im->height; i++) {
