@@ -1,6 +1,7 @@
 #include "noise_results.h"
 
 #include "reference/suite/suite.h"
+#include "tools/base/text.h"
 
 #include <string.h>
 
@@ -163,10 +164,9 @@ static void print_estimate(char text[NOISE_CELL], const json_t *j, const char *n
     snprintf(ci, sizeof ci, "%s_ci", name);
     if (json_object_get(j, name) == NULL)
         return;
-    size_t n = strlen(text);
-    n += (size_t)snprintf(text + n, NOISE_CELL - n, format, member_number(j, name));
+    text_append(text, NOISE_CELL, format, member_number(j, name));
     if (json_array_size(json_object_get(j, ci)) == 2)
-        snprintf(text + n, NOISE_CELL - n, format_ci, member_end(j, ci, 0), member_end(j, ci, 1));
+        text_append(text, NOISE_CELL, format_ci, member_end(j, ci, 0), member_end(j, ci, 1));
 }
 
 static void print_variance(char text[NOISE_CELL], const json_t *j)
@@ -186,15 +186,13 @@ static void print_against(char text[NOISE_CELL], const json_t *row)
     bool differs = tile != NULL &&
                    strcmp(member_text(tile, "ratio_verdict"), verdict_name(VERDICT_DIFFERENT)) == 0;
     for (int i = 0; i < 1 + differs; i++) {
-        size_t n = strlen(text);
         if (i == 0)
             snprintf(text, NOISE_CELL, "%s: ", member_text(row, "against"));
         else
-            snprintf(text + n, NOISE_CELL - n, "; tile %.0f,%.0f: ", member_number(tile, "x"),
-                     member_number(tile, "y"));
+            text_append(text, NOISE_CELL, "; tile %.0f,%.0f: ", member_number(tile, "x"),
+                        member_number(tile, "y"));
         print_estimate(text, of[i], "ratio", "%.3g", " [%.3g, %.3g]");
-        n = strlen(text);
-        snprintf(text + n, NOISE_CELL - n, ", margin %.3g", member_number(of[i], "margin"));
+        text_append(text, NOISE_CELL, ", margin %.3g", member_number(of[i], "margin"));
     }
 }
 

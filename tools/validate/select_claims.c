@@ -4,6 +4,7 @@
 #include "reference/external/engine_bindings.h"
 #include "reference/store/reference_render.h"
 #include "reference/truth/truth.h"
+#include "tools/base/text.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -63,16 +64,14 @@ static bool check_claims(const struct validation *v, struct err *e)
     for (int i = 0; i < v->opt->num_only; i++) {
         const char *only = v->opt->only[i];
         char name[CLAIM_NAME], names[sizeof e->msg] = "";
-        size_t n = 0;
         bool found = strchr(only, '/') == NULL;
         for (int k = 0; k < v->num_tasks && !found; k++) {
             if (!is_of_scene(only, v->task[k].scene->name))
                 continue;
             claim_run_name(&v->task[k], name);
             found = strcmp(name, only) == 0;
-            n += (size_t)snprintf(names + n, sizeof names - n, "%s%s", n > 0 ? ", " : "",
-                                  strchr(name, '/') + 1);
-            n = n < sizeof names ? n : sizeof names - 1;
+            text_append(names, sizeof names, "%s%s", names[0] != '\0' ? ", " : "",
+                        strchr(name, '/') + 1);
         }
         if (!found)
             return err_set(e, "--only: no claim '%s'; there are %s", only, names);

@@ -1,6 +1,7 @@
 #include "anchors.h"
 
 #include "reference/base/json_file.h"
+#include "reference/base/json_node.h"
 
 #include <gsl/gsl_cdf.h>
 #include <math.h>
@@ -63,20 +64,15 @@ const char *const anchor_rule_name[NUM_ANCHOR_RULES] = {
     [RULE_IDIFF_PERCENT_TUNED] = "idiff, -failpercent",
 };
 
-/* JSON has no infinity: null stands for it. */
-static json_t *number(double v)
-{
-    return isfinite(v) ? json_real(v) : json_null();
-}
-
 static json_t *pack_outcome(const struct anchor_outcome *o)
 {
     json_t *bias = json_object();
     for (int k = 0; k < NUM_ANCHOR_ERRORS; k++) {
         const struct anchor_bias *b = &o->bias[k];
         json_object_set_new(bias, anchor_error_id[k],
-                            json_pack("{so so so si}", "b", number(b->b), "lo", number(b->lo), "hi",
-                                      number(b->hi), "found", b->found));
+                            json_pack("{so so so si}", "b", json_finite(b->b), "lo",
+                                      json_finite(b->lo), "hi", json_finite(b->hi), "found",
+                                      b->found));
     }
     return json_pack("{sf si so}", "threshold", o->threshold, "false_alarms", o->false_alarms,
                      "bias", bias);
