@@ -151,8 +151,8 @@ endef
 # libassay.so (tools/library/assay.h): what two images need, compiled so that it may lie anywhere.
 LIBRARY_ABI     := 1
 LIBRARY_SOURCES := $(wildcard $(addsuffix /*.c,$(addprefix renderer/,base math image) reference/base reference/suite \
-  $(addprefix tools/,images stats compare exact input sequential results html plots report library)) tools/base/temp_dir.c \
-  tools/validate/compare_job.c tools/validate/same_program.c)
+  $(addprefix tools/,images stats compare exact input sequential results html plots report library)) \
+  $(addprefix tools/base/,temp_dir.c text.c) tools/validate/compare_job.c tools/validate/same_program.c)
 $(BUILD)/pic/%: CFLAGS += -fPIC
 $(BUILD)/libassay.so.$(LIBRARY_ABI): $(call obj,$(BUILD)/pic,$(LIBRARY_SOURCES)) tools/library/assay.map | $(BUILD)/oiio.so
 	$(call say,LINK,$@)
