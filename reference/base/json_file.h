@@ -13,10 +13,8 @@ json_t *json_read(const char *path, size_t flags, json_error_t *why);
 json_t *json_read_or_say(const char *path, struct err *e);
 
 /* Writes by rename, indented, with a final newline; makes the directories above it. */
-bool json_write(const char *path, const json_t *root, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool json_write(const char *path, const json_t *root, struct err *e);
 /* The same with flags of json_dumps(), in a directory that is there. */
-bool json_write_as(const char *path, const json_t *root, size_t flags, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool json_write_as(const char *path, const json_t *root, size_t flags, struct err *e);
 
 #endif

@@ -16,23 +16,21 @@ struct json_node {
 };
 
 /* Fails on a member that is not in the NULL-terminated list. */
-bool json_only_keys(const struct json_node *n, const char *const *allowed, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool json_only_keys(const struct json_node *n, const char *const *allowed, struct err *e);
 
 /* Each fails if the member is missing, of another type, or out of range. */
-bool json_get(const struct json_node *n, const char *key, json_t **out, struct err *e)
-    __attribute__((warn_unused_result));
-bool json_get_object(const struct json_node *n, const char *key, json_t **out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool json_get(const struct json_node *n, const char *key, json_t **out, struct err *e);
+NODISCARD bool json_get_object(const struct json_node *n, const char *key, json_t **out,
+                               struct err *e);
 /* lo <= *out <= hi */
-bool json_get_int(const struct json_node *n, const char *key, int lo, int hi, int *out,
-                  struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool json_get_int(const struct json_node *n, const char *key, int lo, int hi, int *out,
+                            struct err *e);
 /* lo < *out < hi */
-bool json_get_number(const struct json_node *n, const char *key, double lo, double hi, double *out,
-                     struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool json_get_number(const struct json_node *n, const char *key, double lo, double hi,
+                               double *out, struct err *e);
 /* One line of text, neither empty nor longer than the buffer. */
-bool json_get_text(const struct json_node *n, const char *key, char *out, size_t size,
-                   struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool json_get_text(const struct json_node *n, const char *key, char *out, size_t size,
+                             struct err *e);
 
 /* A number, and an interval as [lo, hi], or null where one of them is not finite. */
 json_t *json_finite(double v);
@@ -40,7 +38,7 @@ json_t *json_interval(double lo, double hi);
 
 /* An array of texts as a command line, after `first` (NULL: nothing), in words that shell_quote_split() reads back: to free(). NULL
  * out of memory. */
-char *json_command_line(const char *first, const json_t *words) __attribute__((warn_unused_result));
+NODISCARD char *json_command_line(const char *first, const json_t *words);
 
 /* Two numbers, the lower first? */
 bool json_is_interval(const json_t *v);

@@ -34,8 +34,7 @@ struct process_usage {
  * this returns, and when the calling process dies of anything, every process of the group has been
  * killed. stdin is /dev/null. usage may be NULL; it is filled whenever the program was started. May
  * be called from several threads. Linux only (PR_SET_PDEATHSIG). */
-bool process_run(const struct process *p, struct process_usage *usage, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool process_run(const struct process *p, struct process_usage *usage, struct err *e);
 
 /* True if argv0 can be found in PATH; fills its absolute path. An argv0 with a slash is a path. */
 bool process_find(const char *argv0, char *path, size_t size);

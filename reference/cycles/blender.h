@@ -9,7 +9,7 @@
 
 /* Runs a command, in which the script's base name stands for the file `script` of share_dir, in the directory dir, where what it prints
  * becomes blender.log. */
-bool blender_run(const char *command, const char *share_dir, const char *script, const char *dir,
-                 double timeout_s, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool blender_run(const char *command, const char *share_dir, const char *script,
+                           const char *dir, double timeout_s, struct err *e);
 
 #endif

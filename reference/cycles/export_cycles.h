@@ -46,7 +46,7 @@
  * depth above 1025, shading normals of one triangle on both of its sides, a microfacet or a
  * highlight that takes facets (all but GGX, separable, of constant reflectance, alpha 0.01 to 1) where there are lights that
  * no ray runs into: point, spot, directional, the assignment's ambient light. */
-bool export_cycles(const struct scene *s, const struct camera *c, int depth, const char *path,
-                   struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool export_cycles(const struct scene *s, const struct camera *c, int depth,
+                             const char *path, struct err *e);
 
 #endif

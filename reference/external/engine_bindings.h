@@ -9,7 +9,7 @@ const struct engine_driver *engine_driver_of(const char *engine);
 
 /* Writes the scene for an engine of the table: path by rename, last; files that it names lie beside it, are called after it and
  * are written before it. False with one line: a file that cannot be written, or what the engine cannot express. */
-bool engine_export(const struct engine_kind *kind, const struct scene *s, const struct camera *c,
-                   int depth, const char *path, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool engine_export(const struct engine_kind *kind, const struct scene *s,
+                             const struct camera *c, int depth, const char *path, struct err *e);
 
 #endif

@@ -43,8 +43,7 @@ struct engine_options {
 
 /* Fails, naming file and key, on anything that is not as above: unknown keys and placeholders, values
  * of the wrong type, a command without {scene} or {out}, "mean" without {seed}. */
-bool engine_load(const char *path, struct engine *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool engine_load(const char *path, struct engine *out, struct err *e);
 void engine_free(struct engine *en);
 
 /* What stands for a placeholder. */
@@ -54,14 +53,13 @@ struct engine_value {
 /* argv of some keys ("command", "version", ...; NULL at the end) one behind the other, placeholders filled in from `values`, which
  * end with a NULL name. A placeholder without a value fails. *argv is one block of memory that the
  * caller frees, NULL-terminated; absent keys add nothing. */
-bool engine_argv(const struct engine *en, const char *const *keys,
-                 const struct engine_value *values, char ***argv, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool engine_argv(const struct engine *en, const char *const *keys,
+                           const struct engine_value *values, char ***argv, struct err *e);
 
 /* True if the engine can render the scene: it has all features, and the scene can be written in its
  * format. Else `why` is one line. Tries it in a directory below dir, which exists. */
-bool engine_expresses(const struct engine *en, const struct suite_scene *scene, const char *dir,
-                      struct err *why) __attribute__((warn_unused_result));
+NODISCARD bool engine_expresses(const struct engine *en, const struct suite_scene *scene,
+                                const char *dir, struct err *why);
 
 /* Renders. *out (unit "replicate", "exact", "sample" or, of one noisy image, of whose noise nothing is known, "picture") and *manifest (a new reference) belong to the
  * caller; the manifest's members are those of reference_render.h, with "description_sha256" and "files" (the
@@ -70,8 +68,8 @@ bool engine_expresses(const struct engine *en, const struct suite_scene *scene, 
  * image of another size, without R, G and B, with pixels that are not finite, or the same image
  * for two seeds (unless no pixel of it has any noise: then it is "exact"). What it left is then kept,
  * and the line names the directory. */
-bool engine_render(const struct engine *en, const struct suite_scene *scene,
-                   const struct engine_options *opt, struct moments *out, json_t **manifest,
-                   struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool engine_render(const struct engine *en, const struct suite_scene *scene,
+                             const struct engine_options *opt, struct moments *out,
+                             json_t **manifest, struct err *e);
 
 #endif

@@ -22,17 +22,16 @@ struct engine_job {
 };
 
 /* Checks that the engine can, and writes the scene to paths[0], or in grey one for each channel; for a .dae only fills paths[0]. */
-bool engine_write_scene(const struct engine *en, const struct suite_scene *suite, const char *dir,
-                        char paths[3][PATH_SIZE], struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool engine_write_scene(const struct engine *en, const struct suite_scene *suite,
+                                  const char *dir, char paths[3][PATH_SIZE], struct err *e);
 
 /* Full path of the program of a key ("command", "version"). A name with a slash is relative to the
  * description, not to where we run. */
-bool engine_program(const struct engine *en, const char *key, char *path, size_t size,
-                    struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool engine_program(const struct engine *en, const char *key, char *path, size_t size,
+                              struct err *e);
 
 /* The manifest of what was rendered, a new reference. */
-bool engine_describe(const struct engine_job *j, const struct moments *m, double wall_s,
-                     json_t **manifest, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool engine_describe(const struct engine_job *j, const struct moments *m, double wall_s,
+                               json_t **manifest, struct err *e);
 
 #endif

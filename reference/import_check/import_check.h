@@ -36,9 +36,8 @@ struct import_report {
 /* dump: what blender_import.py wrote of one file, still in Blender's axes. Fails on a dump that is not of
  * that format, that holds an error of Blender's, and on a scene in the CGL dialect (whose camera is
  * placed anew). */
-bool import_check_compare(const struct scene *s, const struct camera *c, const json_t *dump,
-                          struct import_report *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool import_check_compare(const struct scene *s, const struct camera *c,
+                                    const json_t *dump, struct import_report *out, struct err *e);
 
 struct import_options {
     const char *work_dir;  /* exists; gets a directory, removed on success */
@@ -47,14 +46,13 @@ struct import_options {
 };
 
 /* One Blender reads all `num` scenes. *dumps: an array of as many objects (a new reference). */
-bool import_check_run(const struct suite_scene *const *scene, int num,
-                      const struct import_options *opt, json_t **dumps, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool import_check_run(const struct suite_scene *const *scene, int num,
+                                const struct import_options *opt, json_t **dumps, struct err *e);
 
 /* Both, and as JSON (a new reference): [{"scene", "agrees", "what" or "error", and all numbers of
  * the report}]. A scene that cannot be judged has "error"; where Blender has no importer of COLLADA (as built by Debian 13, and from
  * 5.0 on), each has "absent" with the reason instead, and nothing was checked. */
-bool import_check(const struct suite_scene *const *scene, int num, const struct import_options *opt,
-                  json_t **reports, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool import_check(const struct suite_scene *const *scene, int num,
+                            const struct import_options *opt, json_t **reports, struct err *e);
 
 #endif

@@ -31,8 +31,8 @@ void import_geometry_differ(struct import_pair *pair, const char *fmt, ...)
     __attribute__((format(printf, 2, 3)));
 
 /* found: one per triangle of ours, set for those that some polygon is made of. */
-bool import_geometry_compare(struct import_pair *pair, const json_t *meshes, bool *found,
-                             struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool import_geometry_compare(struct import_pair *pair, const json_t *meshes, bool *found,
+                                       struct err *e);
 
 static inline point point_of(vec3 v)
 {

@@ -11,7 +11,7 @@
  * refracts, Schlick's approximation, correlated shadowing, emission on both sides, smooth emitters
  * that reflect, a falloff that is not the inverse square, spot lights that are brighter in the
  * middle, the ambient light of the assignment, and what features_check_exportable() refuses. */
-bool export_mitsuba(const struct scene *s, const struct camera *c, int depth, const char *path,
-                    struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool export_mitsuba(const struct scene *s, const struct camera *c, int depth,
+                              const char *path, struct err *e);
 
 #endif

@@ -15,10 +15,9 @@ struct mitsuba_xml {
 };
 
 /* Opens <scene>; free with mitsuba_free(), also on failure. */
-bool mitsuba_new(struct mitsuba_xml *x, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool mitsuba_new(struct mitsuba_xml *x, struct err *e);
 /* Closes it and writes the file, by rename. */
-bool mitsuba_write(struct mitsuba_xml *x, const char *path, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool mitsuba_write(struct mitsuba_xml *x, const char *path, struct err *e);
 void mitsuba_free(struct mitsuba_xml *x);
 
 /* <tag type="type" key="value">, without the attributes that are NULL; up to mitsuba_end(). */

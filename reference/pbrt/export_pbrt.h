@@ -11,7 +11,7 @@
  * glass, a boundary that only refracts, Schlick's approximation, a falloff that is not the inverse square, spot lights that are
  * brighter in the middle, environment images of more than 512 rows, the ambient light of the assignment, and what
  * features_check_exportable() refuses. */
-bool export_pbrt(const struct scene *s, const struct camera *c, int depth, const char *path,
-                 struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool export_pbrt(const struct scene *s, const struct camera *c, int depth,
+                           const char *path, struct err *e);
 
 #endif

@@ -45,8 +45,7 @@ struct povray_variant povray_variant_plain(void);
 
 /* Writes the scene file; the first lines say with which command line to render it. Fails as
  * povray_passes() does, and on a write error. f stays open. */
-bool export_povray(const struct scene *s, const struct camera *c, int depth,
-                   const struct povray_variant *v, FILE *f, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool export_povray(const struct scene *s, const struct camera *c, int depth,
+                             const struct povray_variant *v, FILE *f, struct err *e);
 
 #endif

@@ -14,8 +14,8 @@ bool povray_is_glass(const struct material *m);
  * outside, a sphere seen from inside, anything that may touch the body or be inside it (bounding
  * boxes of triangles are taken for the triangles), the eye too; and refraction alone by triangles
  * beside a mirror, glass or an environment: POV-Ray reflects totally where we have nothing. */
-bool povray_check_glass(const struct scene *s, const struct camera *c, double extent, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool povray_check_glass(const struct scene *s, const struct camera *c, double extent,
+                                  struct err *e);
 
 /* Total reflection has to find nothing: there is refraction alone by triangles. */
 bool povray_hides_total_reflection(const struct scene *s);

@@ -47,8 +47,8 @@ struct povray_passes {
  * red, green or blue but emits it while reflecting others, glass that povray_glass.h refuses, depth
  * beyond what is verified, shading normals behind their triangle, and sizes at which POV-Ray's fixed
  * tolerances show. */
-bool povray_passes(const struct scene *s, const struct camera *c, int depth,
-                   struct povray_passes *out, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool povray_passes(const struct scene *s, const struct camera *c, int depth,
+                             struct povray_passes *out, struct err *e);
 
 /* Some pass has indirect light that is not constant: the images have noise. */
 bool povray_passes_are_noisy(const struct povray_passes *p);

@@ -14,8 +14,8 @@ struct povray_replicates {
 };
 
 /* Fails where povray_passes() does. */
-bool povray_replicates(const struct reference_job *job, struct povray_replicates *out,
-                       struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool povray_replicates(const struct reference_job *job, struct povray_replicates *out,
+                                 struct err *e);
 struct povray_image povray_replicates_window(const struct povray_replicates *s, int j, int pass);
 struct povray_image povray_replicates_replicate(const struct povray_replicates *s, int i, int pass,
                                                 bool indirect);
@@ -27,8 +27,8 @@ void povray_command_line(const struct povray_replicates *s, const char *program,
                          const char *argv[POVRAY_ARGS]);
 
 /* As struct engine_driver has it. */
-bool povray_fold(const struct reference_job *job, const struct replicate_images *images,
-                 const json_t *said, struct moments *out, json_t *manifest, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool povray_fold(const struct reference_job *job, const struct replicate_images *images,
+                           const json_t *said, struct moments *out, json_t *manifest,
+                           struct err *e);
 
 #endif

@@ -7,8 +7,7 @@
 
 /* Fails with a line on more texels, edges written out, than a map has entries: 254 in each direction, 127 if nearest; and on
  * materials that reflect and glow where one of both has a texture. */
-bool povray_check_textures(const struct scene *s, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool povray_check_textures(const struct scene *s, struct err *e);
 
 /* "pigment { ... }" of factor times that map, for the triangles of a material. */
 void povray_put_texture(const struct povray_writer *w, uint32_t material, uint32_t map, rgb factor);

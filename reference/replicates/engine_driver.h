@@ -57,9 +57,9 @@ struct engine_driver {
 };
 
 /* All of it here: count, render, fold. */
-bool engine_driver_render(const struct engine_driver *driver, const struct reference_job *job,
-                          struct moments *out, json_t *manifest, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool engine_driver_render(const struct engine_driver *driver,
+                                    const struct reference_job *job, struct moments *out,
+                                    json_t *manifest, struct err *e);
 
 /* Date (UTC), and the seconds since the start once it is stopped; CPU: of this process and all children that were waited for. */
 struct timing {

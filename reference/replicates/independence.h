@@ -42,8 +42,8 @@ struct replicates {
         sharing; /* how many times the sum of pixels' variances their sum has by a filter that is known; 0: once */
 };
 
-bool replicates_alloc(struct replicates *r, int width, int height, int count, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool replicates_alloc(struct replicates *r, int width, int height, int count,
+                                struct err *e);
 void replicates_add(struct replicates *r, const float *pixels_rgb);
 void replicates_free(struct replicates *r);
 
@@ -75,10 +75,9 @@ struct independence {
 };
 
 /* False only out of memory. */
-bool independence_test(const struct replicates *r, double alpha, struct independence *out,
-                       struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool independence_test(const struct replicates *r, double alpha, struct independence *out,
+                                 struct err *e);
 /* The same, and adds all of it to the manifest as "independence"; a failed test is an error that says which. */
-bool independence_check(const struct replicates *r, json_t *manifest, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool independence_check(const struct replicates *r, json_t *manifest, struct err *e);
 
 #endif

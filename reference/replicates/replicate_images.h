@@ -22,11 +22,11 @@ void replicate_images_path(const char *dir, const char *prefix, int number,
                            char path[REPLICATE_IMAGE_PATH]);
 /* Packed RGB of width x height; the caller frees. NULL with a line on another size, on half floats, and on values that are
  * not finite or, without `below_zero`, negative. */
-float *replicate_images_read(const char *path, int width, int height, bool below_zero,
-                             struct err *e) __attribute__((warn_unused_result));
+NODISCARD float *replicate_images_read(const char *path, int width, int height, bool below_zero,
+                                       struct err *e);
 /* The same bits as a file, which appears whole. */
-bool replicate_images_write(const char *path, int width, int height, const float *pixels_rgb,
-                            struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool replicate_images_write(const char *path, int width, int height,
+                                      const float *pixels_rgb, struct err *e);
 
 /* Images that repeat betray a seed without effect, and would make a standard error that is too small. The exception is
  * light without noise: every pixel has random numbers of its own, so if all pixels of all images agree to the bit, no
@@ -37,8 +37,7 @@ struct replicate_repeats {
     bool without_noise; /* all pixels of all so far agree */
     uint8_t (*digest)[32];
 };
-bool replicate_repeats_alloc(struct replicate_repeats *r, int capacity, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool replicate_repeats_alloc(struct replicate_repeats *r, int capacity, struct err *e);
 /* Takes the next image; the number of the first that was the same, its own if there is none. */
 int replicate_repeats_add(struct replicate_repeats *r, const float *pixels_rgb, size_t pixels);
 void replicate_repeats_free(struct replicate_repeats *r);

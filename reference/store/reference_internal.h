@@ -6,10 +6,11 @@
 #include "reference/external/engine_bindings.h"
 
 /* Calls act() with the scene open and a directory of its own below opt->work_dir, which stays for inspection if that fails. */
-bool reference_in_directory(const struct suite_scene *scene, const struct suite_reference *ref,
-                            const struct reference_options *opt,
-                            bool (*act)(const struct reference_job *job, void *ctx, struct err *e),
-                            void *ctx, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool
+reference_in_directory(const struct suite_scene *scene, const struct suite_reference *ref,
+                       const struct reference_options *opt,
+                       bool (*act)(const struct reference_job *job, void *ctx, struct err *e),
+                       void *ctx, struct err *e);
 
 /* Adds what every reference's manifest says. */
 void reference_describe(const struct suite_scene *scene, const struct suite_reference *ref,

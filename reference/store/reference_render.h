@@ -13,59 +13,58 @@
  * Fails (with the engine's own last lines) when the engine is absent, dies, hangs, writes something
  * unreadable or replicates that are not independent, and when it cannot express the scene; what the
  * engine left is then kept, and the line names the directory. */
-bool reference_render(const struct suite_scene *scene, const struct suite_reference *ref,
-                      const struct reference_options *opt, struct moments *out, json_t **manifest,
-                      struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool reference_render(const struct suite_scene *scene, const struct suite_reference *ref,
+                                const struct reference_options *opt, struct moments *out,
+                                json_t **manifest, struct err *e);
 
 /* The same in parts, which may be made anywhere and in any order: ranges of the images that an engine's reference is folded
  * from (replicate_images.h). Not of "truth". */
 
 /* Can the engine express the scene, its filter, too? Fails with the reason. Not of "truth" and "pathtracer". */
-bool reference_is_expressible(const struct suite_scene *scene, const struct suite_reference *ref,
-                              const struct reference_options *opt, struct err *why)
-    __attribute__((warn_unused_result));
+NODISCARD bool reference_is_expressible(const struct suite_scene *scene,
+                                        const struct suite_reference *ref,
+                                        const struct reference_options *opt, struct err *why);
 
 /* Is it made by rendering, and stored? Not closed forms, which are computed, nor our own program, which renders each time. */
 bool reference_is_rendered(const struct suite_reference *ref);
 
 /* How many images that are. */
-bool reference_count(const struct suite_scene *scene, const struct suite_reference *ref,
-                     const struct reference_options *opt, int *num, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool reference_count(const struct suite_scene *scene, const struct suite_reference *ref,
+                               const struct reference_options *opt, int *num, struct err *e);
 /* Images first .. last-1 into dir, which exists: picture_NNNN.exr (float32, to the bit what the fold takes), each looked at,
  * and, in the end, part.json: "of" (scene, its hash, engine, settings, seed), "first", "last", "said" (what only the
  * engine knows: version, hash of its binary ...), "cpu_s", "wall_s". */
-bool reference_render_part(const struct suite_scene *scene, const struct suite_reference *ref,
-                           const struct reference_options *opt, int first, int last,
-                           const char *dir, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool reference_render_part(const struct suite_scene *scene,
+                                     const struct suite_reference *ref,
+                                     const struct reference_options *opt, int first, int last,
+                                     const char *dir, struct err *e);
 /* What reference_render() returns: the same moments to the bit, the same manifest but for "date", "cpu_s" and "wall_s": this
  * function's and those of all parts added. dir: num directories of such parts, in the order of their images. Fails
  * also if these are not all images of this reference, each once, or not all made by the same version of the engine. */
-bool reference_fold_parts(const struct suite_scene *scene, const struct suite_reference *ref,
-                          const struct reference_options *opt, const char *const *dir, int num,
-                          struct moments *out, json_t **manifest, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool reference_fold_parts(const struct suite_scene *scene,
+                                    const struct suite_reference *ref,
+                                    const struct reference_options *opt, const char *const *dir,
+                                    int num, struct moments *out, json_t **manifest, struct err *e);
 
 /* golden/<scene>/<engine>.exr and golden/<scene>/manifest.json: an object with one member per engine,
  * what reference_render() said and exr_sha256; the others are kept. Both appear by rename: the
  * image beside its place (.exr.next), the manifest with its hash, the image in its place. So whenever a
  * writer is killed there is the old pair or the new one, which golden_read() finds. Engines may be
  * written at the same time. */
-bool golden_write(const char *golden_dir, const char *scene, const char *engine,
-                  const struct moments *m, json_t *manifest, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool golden_write(const char *golden_dir, const char *scene, const char *engine,
+                            const struct moments *m, json_t *manifest, struct err *e);
 /* Ends what a killed golden_write() began: an image beside its place that the manifest describes takes it, another is removed. */
-bool golden_settle(const char *golden_dir, const char *scene, const char *engine, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool golden_settle(const char *golden_dir, const char *scene, const char *engine,
+                             struct err *e);
 /* The entry first, then the image. True also where there is none. */
-bool golden_remove(const char *golden_dir, const char *scene, const char *engine, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool golden_remove(const char *golden_dir, const char *scene, const char *engine,
+                             struct err *e);
 /* Fails if there is none, if its scene hash differs from scene->sha256 (a stale golden), if the
  * EXR's hash differs from the manifest's, or if size, depth, spp, replicates are not those of the
  * suite. *manifest is a new reference. */
-bool golden_read(const char *golden_dir, const struct suite_scene *scene,
-                 const struct suite_reference *ref, struct moments *out, json_t **manifest,
-                 struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool golden_read(const char *golden_dir, const struct suite_scene *scene,
+                           const struct suite_reference *ref, struct moments *out,
+                           json_t **manifest, struct err *e);
 
 enum golden_state {
     GOLDEN_CURRENT, /* golden_read() accepts it */
@@ -89,14 +88,13 @@ bool golden_is_there(const char *golden_dir, const struct suite_scene *scene,
 const char *golden_state_name(enum golden_state state);
 /* "scene/engine" of each stored image or manifest entry that the suite has no reference for: the
  * members of a new object. Empty if the directory does not exist. */
-bool golden_orphans(const char *golden_dir, const struct suite *suite, json_t **names,
-                    struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool golden_orphans(const char *golden_dir, const struct suite *suite, json_t **names,
+                              struct err *e);
 
 /* Hash of all that decides the bits of an engine's reference on one machine: scene, settings, seed, the
  * files that the exporter writes, cycles.py, the engine's binary. A stored reference with this "key" in
  * its manifest need not be rendered again. Fails if the engine is absent or cannot express the scene. */
-bool reference_key(const struct suite_scene *scene, const struct suite_reference *ref,
-                   const struct reference_options *opt, char key[65], struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool reference_key(const struct suite_scene *scene, const struct suite_reference *ref,
+                             const struct reference_options *opt, char key[65], struct err *e);
 
 #endif

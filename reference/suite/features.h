@@ -46,25 +46,22 @@ extern const char *const features_material_names[NUM_MATERIAL_KINDS];
 
 /* For the writers of scene files; each fails with `engine` in front. Where the near or far plane may cut geometry, and
  * where there is none: */
-bool features_check_clipping(const char *engine, const struct scene *s, const struct camera *c,
-                             struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool features_check_clipping(const char *engine, const struct scene *s,
+                                       const struct camera *c, struct err *e);
 /* For engines that clip by depth, we by distance. Where each primitive in front of the camera lies wholly before the near
  * plane, wholly beyond the far one, or wholly between, and depths tell the same primitives apart: those depths; 0 and
  * INFINITY where a plane cuts off nothing. Else fails as features_check_clipping(). */
-bool features_clip_depths(const char *engine, const struct scene *s, const struct camera *c,
-                          double *near, double *far, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool features_clip_depths(const char *engine, const struct scene *s,
+                                    const struct camera *c, double *near, double *far,
+                                    struct err *e);
 /* Where the camera's pixels are not square or its axes not orthogonal. */
-bool features_check_axes(const char *engine, const struct camera *c, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool features_check_axes(const char *engine, const struct camera *c, struct err *e);
 /* Where a shading normal of a vertex is on the back of its triangle. */
-bool features_check_normals(const char *engine, const struct scene *s, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool features_check_normals(const char *engine, const struct scene *s, struct err *e);
 /* Where a material has a texture. */
-bool features_check_textures(const char *engine, const struct scene *s, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool features_check_textures(const char *engine, const struct scene *s, struct err *e);
 /* Axes, clipping, normals and textures. */
-bool features_check_exportable(const char *engine, const struct scene *s, const struct camera *c,
-                               struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool features_check_exportable(const char *engine, const struct scene *s,
+                                         const struct camera *c, struct err *e);
 
 #endif

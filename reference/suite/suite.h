@@ -91,13 +91,12 @@ struct suite {
 
 /* Loads all scenes of a directory: those of its suite.json, else all that stand in it. A 9x scene inherits the `references` object of the scene it
  * names. Fails on an empty directory, a .dae without .json and the reverse. */
-bool suite_load(const char *dir, struct suite *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool suite_load(const char *dir, struct suite *out, struct err *e);
 void suite_free(struct suite *s);
 /* Reads the scene with its environment, and its camera with its lens. The caller calls
  * scene_free(scene). */
-bool suite_open(const struct suite_scene *s, struct scene *scene, struct camera *camera,
-                struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool suite_open(const struct suite_scene *s, struct scene *scene, struct camera *camera,
+                          struct err *e);
 /* NULL if there is none of that name. */
 const struct suite_scene *suite_find(const struct suite *s, const char *name);
 const struct suite_reference *suite_reference_of(const struct suite_scene *s, const char *engine);

@@ -6,7 +6,6 @@
 
 /* Everything that suite.h describes but what a 9x scene inherits. s->name is set and s->json is the
  * parsed file, which s->reference and s->not_expressible then borrow from. */
-bool suite_json_read(const char *file, struct suite_scene *s, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool suite_json_read(const char *file, struct suite_scene *s, struct err *e);
 
 #endif

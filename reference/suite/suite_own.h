@@ -10,7 +10,6 @@ bool suite_own_is(const char *dir);
 
 /* All scenes of the file, without their hashes: suite_load() adds these and frees `out`, also after a failure. An error names
  * the file and the member. */
-bool suite_own_read(const char *dir, struct suite *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool suite_own_read(const char *dir, struct suite *out, struct err *e);
 
 #endif

@@ -14,15 +14,15 @@
 #include "reference/suite/suite.h"
 
 /* Is the form known for the scene's pixel filter? */
-bool truth_knows(const struct suite_scene *scene, const struct suite_reference *ref, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool truth_knows(const struct suite_scene *scene, const struct suite_reference *ref,
+                           struct err *e);
 
 /* Fills *out (unit "exact", spp 0) for that reference of that scene. Fails on an unknown kind, on
  * missing, unknown or impossible values, on a depth at which the form does not hold, on a filter for which
  * it is not known, and where a quadrature over a pixel has not converged (to 1e-10 of the pixel's value;
  * glass_sphere: truth_pixel_mean.h). The caller frees. */
-bool truth_render(const struct suite_scene *scene, const struct suite_reference *ref,
-                  struct moments *out, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool truth_render(const struct suite_scene *scene, const struct suite_reference *ref,
+                            struct moments *out, struct err *e);
 
 /* Radiance inside a closed room whose walls all emit `emission` and reflect `albedo` by Lambert's
  * law, counting paths of 0 .. depth bounces: emission * sum_{k=0}^{depth} albedo^k. */
@@ -38,12 +38,10 @@ struct truth_kind {
 };
 
 /* Fails, naming the channel, unless all three lie in [0, hi]; `hi` may be HUGE_VAL. */
-bool truth_check_triple(const char *name, const double v[3], double hi, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool truth_check_triple(const char *name, const double v[3], double hi, struct err *e);
 
 /* Fails unless paths of one bounce, direct light, are counted. */
-bool truth_check_depth(const struct suite_scene *scene, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool truth_check_depth(const struct suite_scene *scene, struct err *e);
 
 /* Pictures that face the camera, each with a texture (truth_texture.c).
  *

@@ -24,7 +24,7 @@ void truth_sample_moments(const struct truth_lamp *lamp, double x, double z, int
 /* Variance of one sample of each pixel and channel, 3 width height numbers that the caller frees.
  * Fails on another kind, on a depth that is not 1, and where rules of two orders disagree by more
  * than 1e-3 of the sum over the image. */
-bool truth_noise(const struct suite_scene *scene, const struct suite_reference *ref,
-                 double **variance, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool truth_noise(const struct suite_scene *scene, const struct suite_reference *ref,
+                           double **variance, struct err *e);
 
 #endif

@@ -19,8 +19,8 @@ struct truth_view {
 
 /* {"eye": [x,y,z], "right": [..], "up": [..], "forward": [..], "tan_half": t}: these keys, no others;
  * the frame orthonormal to 1e-12. The filter is the scene's. */
-bool truth_view_read(json_t *values, const struct suite_scene *scene, struct truth_view *view,
-                     struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool truth_view_read(json_t *values, const struct suite_scene *scene,
+                               struct truth_view *view, struct err *e);
 
 /* Direction of (u, v), unit length. */
 void truth_view_direction(const struct truth_view *view, double u, double v, double d[3]);
@@ -31,8 +31,8 @@ bool truth_sphere_hit(const double o[3], const double d[3], const double centre[
                       double *cos_i, double normal[3]);
 
 /* The smallest cosine of incidence on a sphere that fills all that the image counts. Fails if it does not. */
-bool truth_view_filled(const struct truth_view *view, const double centre[3], double radius,
-                       double *min_cos, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool truth_view_filled(const struct truth_view *view, const double centre[3],
+                                 double radius, double *min_cos, struct err *e);
 
 /* Radiance that arrives at the eye from the unit direction d. The result tells the smooth pieces of the
  * image apart: within one of them light is smooth in the direction, up to a square root at the edge. */
@@ -43,7 +43,7 @@ typedef int truth_shade(const void *form, const double eye[3], const double d[3]
  * (found by bisection), each part and the lines themselves bisected until Gauss-Legendre rules agree to
  * 1e-6 of the value. With a filter each quarter around the pixel's centre by itself, as a filter has a kink there.
  * Fails where they never do, and on images that are not square. */
-bool truth_view_render(const struct truth_view *view, truth_shade *shade, const void *form,
-                       struct moments *out, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool truth_view_render(const struct truth_view *view, truth_shade *shade,
+                                 const void *form, struct moments *out, struct err *e);
 
 #endif

@@ -37,7 +37,6 @@ double truth_gradient_texel(const struct truth_gradient *g, int channel, int wid
                             int col, int row);
 
 /* "mean" and "gradient" of such values; other keys are not looked at. */
-bool truth_gradient_read(json_t *values, struct truth_gradient *g, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool truth_gradient_read(json_t *values, struct truth_gradient *g, struct err *e);
 
 #endif

@@ -19,7 +19,7 @@ bool truth_spot_is_ellipse(const struct truth_spot *s);
 
 /* Mean irradiance over x[0]..x[1] by z[0]..z[1] (either order), of a spot that is an ellipse. Fails
  * where the quadrature has not converged to 1e-10 of the value. */
-bool truth_spot_mean(const struct truth_spot *s, const double x[2], const double z[2], double *mean,
-                     struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool truth_spot_mean(const struct truth_spot *s, const double x[2], const double z[2],
+                               double *mean, struct err *e);
 
 #endif

@@ -72,8 +72,8 @@ struct cli_option {
 #define CLI_TO_REST(type, member) .kind = CLI_REST, .to = offsetof(type, member), .stops = true
 /* Reads the words into *settings, which hold the defaults. False with one line on what is no option, no value of it, or one word
  * too many. Text is that of argv. */
-bool cli_read(const struct cli_option *options, int argc, char **argv, void *settings,
-              struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool cli_read(const struct cli_option *options, int argc, char **argv, void *settings,
+                        struct err *e);
 
 struct cli {
     const struct cli_option *options; /* ends with a NULL long_name */
@@ -96,23 +96,21 @@ int cli_next(struct cli *c, struct err *e);
 
 /* The words of a command that parsed, each short option and its argument by itself ("-qj4" as "-q -j 4"), for who stores
  * commands or leaves words out: a NULL-terminated array that points into argv too, to free(). NULL: out of memory. */
-char **cli_apart(const struct cli_option *options, int argc, char **argv)
-    __attribute__((warn_unused_result));
+NODISCARD char **cli_apart(const struct cli_option *options, int argc, char **argv);
 
 /* Prints the text and then the table in two columns on stdout. */
 void cli_print_help(const char *usage, const struct cli_option *options);
 
 /* The whole of `text` must be a number inside [lo, hi]; `what` names it in the line. A whole one may be written as 1e3. */
-bool cli_int(const char *what, const char *text, long lo, long hi, int *out, struct err *e)
-    __attribute__((warn_unused_result));
-bool cli_uint32(const char *what, const char *text, uint32_t *out, struct err *e)
-    __attribute__((warn_unused_result));
-bool cli_double(const char *what, const char *text, double lo, double hi, double *out,
-                struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool cli_int(const char *what, const char *text, long lo, long hi, int *out,
+                       struct err *e);
+NODISCARD bool cli_uint32(const char *what, const char *text, uint32_t *out, struct err *e);
+NODISCARD bool cli_double(const char *what, const char *text, double lo, double hi, double *out,
+                          struct err *e);
 
 /* Index of `text` in a NULL-terminated list of words; fails naming the list. */
-bool cli_choice(const char *what, const char *text, const char *const *words, int *out,
-                struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool cli_choice(const char *what, const char *text, const char *const *words, int *out,
+                          struct err *e);
 
 /* Of the words that `next` gives for 0, 1, .. until NULL the one that was probably meant: the fewest letters to change, insert,
  * leave out or exchange with their neighbours, at most a third of them; NULL: none. */

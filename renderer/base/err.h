@@ -12,6 +12,9 @@ struct err {
     char msg[1024];
 };
 
+/* Of a function whose answer has to be looked at. */
+#define NODISCARD __attribute__((warn_unused_result))
+
 /* Formats the line into e (truncating quietly at its size; e may be NULL), a '?' for each control character.
  * Always returns false, so that a failing function can `return err_set(e, "...")`. */
 bool err_set(struct err *e, const char *fmt, ...) __attribute__((format(printf, 2, 3)));

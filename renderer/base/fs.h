@@ -22,16 +22,15 @@ struct out_file {
 };
 
 /* Opens path's temporary sibling for writing (binary). */
-bool out_open(struct out_file *o, const char *path, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool out_open(struct out_file *o, const char *path, struct err *e);
 /* Flushes, syncs, closes and renames; on failure the temporary is gone and the old file untouched.
  */
-bool out_commit(struct out_file *o, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool out_commit(struct out_file *o, struct err *e);
 /* Closes and removes the temporary. */
 void out_abandon(struct out_file *o);
 /* Whether a file could be begun at path, for who asks before hours of work: false with the line of out_open(), or where a
  * directory has the name. Leaves nothing. */
-bool out_check(const char *path, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool out_check(const char *path, struct err *e);
 
 /* A regular file, or a directory, for reading; NULL with errno: a FIFO would be waited for, a device may have no end (ENOTSUP). The
  * caller closes it. */
@@ -40,14 +39,14 @@ FILE *fs_open(const char *path);
 int fs_open_fd(const char *path);
 
 /* mkdir -p. */
-bool fs_make_dirs(const char *path, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool fs_make_dirs(const char *path, struct err *e);
 /* mkdir -p of the directory part of path. */
-bool fs_make_parent_dirs(const char *path, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool fs_make_parent_dirs(const char *path, struct err *e);
 /* rm -r of a directory that we made; missing is fine. No link in it is followed, also where others change it meanwhile. */
-bool fs_remove_tree(const char *path, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool fs_remove_tree(const char *path, struct err *e);
 
 /* Copies a file; everybody may read the copy. */
-bool fs_copy(const char *from, const char *to, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool fs_copy(const char *from, const char *to, struct err *e);
 /* The name of a file without its directories, within `path`. */
 const char *fs_base(const char *path);
 /* The file `name` in the directory of the file `path`. */

@@ -17,7 +17,7 @@ enum isa {
 
 /* *isa = ISA_AUTO becomes the widest set of this machine; fails with a line if the machine lacks
  * what is asked for. */
-bool isa_choose(enum isa *isa, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool isa_choose(enum isa *isa, struct err *e);
 
 extern const char *const isa_names[]; /* by enum isa; ends with NULL */
 

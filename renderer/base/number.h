@@ -2,10 +2,12 @@
 #ifndef ASSAY_NUMBER_H
 #define ASSAY_NUMBER_H
 
+#include "err.h"
+
 #include <stdbool.h>
 
 /* A finite decimal number that ends at a blank or at the end of the text: *out as strtod() rounds it in the C
  * locale, and where it ends. False on anything else; hexadecimal, "nan" and "inf" are. */
-bool number_parse(const char *s, const char **end, double *out) __attribute__((warn_unused_result));
+NODISCARD bool number_parse(const char *s, const char **end, double *out);
 
 #endif

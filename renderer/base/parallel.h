@@ -2,6 +2,8 @@
 #ifndef ASSAY_PARALLEL_H
 #define ASSAY_PARALLEL_H
 
+#include "err.h"
+
 #include <stdbool.h>
 #include <stddef.h>
 
@@ -21,9 +23,9 @@ struct parallel_task {
 /* Calls work(ctx, t, more) for the first task and for all that come of it, on up to `threads` threads. It
  * gives the number of tasks that it left in `more`, 0 to 2, or -1 if it failed; then false is returned when
  * all threads have come to an end. */
-bool parallel_divide(int threads, const struct parallel_task *first,
-                     int (*work)(void *ctx, const struct parallel_task *t,
-                                 struct parallel_task more[2]),
-                     void *ctx) __attribute__((warn_unused_result));
+NODISCARD bool parallel_divide(int threads, const struct parallel_task *first,
+                               int (*work)(void *ctx, const struct parallel_task *t,
+                                           struct parallel_task more[2]),
+                               void *ctx);
 
 #endif

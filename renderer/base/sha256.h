@@ -5,7 +5,7 @@
 #include "err.h"
 
 /* Lower-case hex SHA-256 of a file (nettle). */
-bool sha256_file(const char *path, char hex[65], struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool sha256_file(const char *path, char hex[65], struct err *e);
 /* The same of a text. */
 void sha256_text(const char *text, char hex[65]);
 

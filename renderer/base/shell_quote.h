@@ -6,13 +6,11 @@
 
 /* `first`, unless it is NULL, and the words of a NULL-terminated array, a blank between two, in quotes where a shell would need
  * them: as long as it takes, to free(). NULL if out of memory. */
-char *shell_quote_join(const char *first, const char *const *word)
-    __attribute__((warn_unused_result));
+NODISCARD char *shell_quote_join(const char *first, const char *const *word);
 
 /* The words of a text that shell_quote_join() made, or that a person typed with blanks, '...' and \ alone: a NULL-terminated
  * array, one block of memory, to free(). NULL with a line on anything else that a shell would act on, on an open quote,
  * and out of memory. */
-char **shell_quote_split(const char *text, int *num, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD char **shell_quote_split(const char *text, int *num, struct err *e);
 
 #endif

@@ -24,15 +24,14 @@ struct bvh_stats {
 struct bvh; /* opaque; refers to the scene, which must outlive it */
 
 /* NULL on failure (out of memory). */
-struct bvh *bvh_build(const struct scene *s, enum bvh_kind kind, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD struct bvh *bvh_build(const struct scene *s, enum bvh_kind kind, struct err *e);
 /* The same with the instructions of BVH_WIDE chosen (it has no scalar version: ISA_SCALAR is as
  * ISA_AUTO); fails too if the machine lacks them. */
-struct bvh *bvh_build_for(const struct scene *s, enum bvh_kind kind, enum isa isa, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD struct bvh *bvh_build_for(const struct scene *s, enum bvh_kind kind, enum isa isa,
+                                    struct err *e);
 /* And on up to `threads` threads, where the kind can (BVH_WIDE): the same tree. */
-struct bvh *bvh_build_on(const struct scene *s, enum bvh_kind kind, enum isa isa, int threads,
-                         struct err *e) __attribute__((warn_unused_result));
+NODISCARD struct bvh *bvh_build_on(const struct scene *s, enum bvh_kind kind, enum isa isa,
+                                   int threads, struct err *e);
 void bvh_free(struct bvh *b);
 
 /* Expected cost of a random ray in primitive tests, a box test counting as one [MacDonald90];

@@ -38,6 +38,6 @@ enum { BVH_MAX_DEPTH = 96 }; /* cuts between the root and a leaf, whatever the p
 
 /* Fills nodes, order, num_nodes and depth of a tree whose scene, num_primitives and order (any
  * permutation) are set: BVH_CENTROID or BVH_SAH. False if out of memory. */
-bool bvh_build_tree(struct bvh *t, enum bvh_kind kind) __attribute__((warn_unused_result));
+NODISCARD bool bvh_build_tree(struct bvh *t, enum bvh_kind kind);
 
 #endif

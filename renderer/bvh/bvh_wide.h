@@ -58,8 +58,7 @@ struct wide {
 
 /* ISA_AUTO: the widest. The same bits on any number of threads. NULL on failure (out of memory; no such
  * instructions). */
-struct wide *wide_build(const struct scene *s, enum isa isa, int threads, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD struct wide *wide_build(const struct scene *s, enum isa isa, int threads, struct err *e);
 void wide_free(struct wide *w);
 
 #endif

@@ -41,9 +41,9 @@ static inline float wide_half_area(const struct wide_box *b)
  * [Ylitie17]. More than eight items, so the root is no leaf; they are put in order of the parts. *p is
  * empty before; wide_build_free() afterwards. The same tree on any number of threads, though its parts may
  * have other numbers. False if out of memory. */
-bool wide_build_make(const struct sah_split_passes *s, struct wide_item *item,
-                     uint32_t num_triangles, const struct wide_range *all, int threads,
-                     struct wide_build *p) __attribute__((warn_unused_result));
+NODISCARD bool wide_build_make(const struct sah_split_passes *s, struct wide_item *item,
+                               uint32_t num_triangles, const struct wide_range *all, int threads,
+                               struct wide_build *p);
 /* The children of part i, not a leaf, as a node; how many. */
 int wide_build_children(const struct wide_build *p, uint32_t i, uint32_t child[WIDTH]);
 void wide_build_free(struct wide_build *p);

@@ -9,12 +9,12 @@
 /* Loads path into *out (which the caller frees with scene_free()). dialect AUTO decides from the
  * file. On failure *out is untouched and e has "path:line: what" (without a line where the whole
  * file is meant). */
-bool collada_load(const char *path, enum dialect dialect, struct scene *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool collada_load(const char *path, enum dialect dialect, struct scene *out,
+                            struct err *e);
 
 /* The same for a document of `size` bytes in memory, the first zero being its end, which may not refer to other files;
  * path is only its name in error lines and where its images are beside. */
-bool collada_parse(const char *text, size_t size, const char *path, enum dialect dialect,
-                   struct scene *out, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool collada_parse(const char *text, size_t size, const char *path, enum dialect dialect,
+                             struct scene *out, struct err *e);
 
 #endif

@@ -23,16 +23,15 @@ struct image {
 };
 
 /* Shape and names alone, data NULL: what a file that is written by rows starts from. */
-bool image_head(struct image *im, int width, int height, int channels, const char *const *names,
-                struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool image_head(struct image *im, int width, int height, int channels,
+                          const char *const *names, struct err *e);
 /* A zeroed image of that shape; names are copied. Fails on sizes below 1 or out of memory. */
-bool image_alloc(struct image *im, int width, int height, int channels, const char *const *names,
-                 struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool image_alloc(struct image *im, int width, int height, int channels,
+                           const char *const *names, struct err *e);
 void image_free(struct image *im);
 
 /* Appends a text attribute (both copied). Fails only out of memory. */
-bool image_set_attr(struct image *im, const char *name, const char *value, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool image_set_attr(struct image *im, const char *name, const char *value, struct err *e);
 /* The value of a text attribute or NULL. Owned by the image. */
 const char *image_get_attr(const struct image *im, const char *name);
 /* Index of a channel by exact name, -1 if absent. */
@@ -48,57 +47,49 @@ enum { IMAGE_MAX_SIDE = 1 << 16, IMAGE_MAX_CHANNELS = 4096 };
 /* Reads an OpenEXR file (its first part; rows or tiles of halves or floats) with its text attributes.
  * Channels are in the file's order. *half (may be NULL) tells if it stored fewer than 32 bits per
  * channel. */
-bool image_read_exr(const char *path, struct image *out, bool *half, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool image_read_exr(const char *path, struct image *out, bool *half, struct err *e);
 /* The same by rows, of an image that need not be in memory as a whole. NULL with a line on failure; `path` has to last. */
 struct image_reader;
-struct image_reader *image_reader_open(const char *path, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD struct image_reader *image_reader_open(const char *path, struct err *e);
 /* Shape, names and attributes: the reader's, or whose who takes and zeroes it after the last row. */
 struct image *image_reader_head(struct image_reader *r);
 bool image_reader_is_half(const struct image_reader *r);
 /* The next *num rows, as many as the file packs together: channel after channel within a row. They belong to the reader and
  * last until the next call. NULL with a line on failure. */
-const float *image_reader_rows(struct image_reader *r, int *num, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD const float *image_reader_rows(struct image_reader *r, int *num, struct err *e);
 void image_reader_close(struct image_reader *r);
 /* Puts such rows in their place in an image. */
 void image_put_rows(struct image *im, int y, const float *rows, int num);
 /* The header alone: data stays NULL. */
-bool image_read_exr_head(const char *path, struct image *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool image_read_exr_head(const char *path, struct image *out, struct err *e);
 /* Reads a Radiance image (RGBE, rows from the top) as R G B. */
-bool image_read_hdr(const char *path, struct image *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool image_read_hdr(const char *path, struct image *out, struct err *e);
 
 /* Writes a float32, ZIP-compressed scan-line OpenEXR with all channels and attributes. The file
  * appears whole, by rename, or not at all. */
-bool image_write_exr(const char *path, const struct image *im, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool image_write_exr(const char *path, const struct image *im, struct err *e);
 
 /* The same for an image that is never in memory as a whole: its rows come from the top, IMAGE_BAND at a time and
  * the rest last, and the file appears when it is closed. */
 enum { IMAGE_BAND = 16 };
 struct image_writer;
 /* head: shape, names and attributes; has to stay as it is until the end. NULL with a line on failure. */
-struct image_writer *image_writer_open(const char *path, const struct image *head, struct err *e)
-    __attribute__((warn_unused_result));
-bool image_writer_rows(struct image_writer *w, const float *rows, int num, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD struct image_writer *image_writer_open(const char *path, const struct image *head,
+                                                 struct err *e);
+NODISCARD bool image_writer_rows(struct image_writer *w, const float *rows, int num, struct err *e);
 /* Both free the writer. Without close there is no file; after a failure there is only abandon. */
-bool image_writer_close(struct image_writer *w, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool image_writer_close(struct image_writer *w, struct err *e);
 void image_writer_abandon(struct image_writer *w);
 
 /* Writes or encodes 8-bit RGB (3 bytes a pixel, row 0 at the top) as PNG. The encoded bytes belong
  * to the caller (free()). The file appears by rename. */
-bool image_write_png(const char *path, int width, int height, const uint8_t *rgb8, struct err *e)
-    __attribute__((warn_unused_result));
-bool image_encode_png(int width, int height, const uint8_t *rgb8, uint8_t **bytes, size_t *size,
-                      struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool image_write_png(const char *path, int width, int height, const uint8_t *rgb8,
+                               struct err *e);
+NODISCARD bool image_encode_png(int width, int height, const uint8_t *rgb8, uint8_t **bytes,
+                                size_t *size, struct err *e);
 /* The file with texts (tEXt, of ASCII) before its pixels. */
-bool image_write_png_texts(const char *path, int width, int height, const uint8_t *rgb8,
-                           const struct image_attr *attr, int num_attrs, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool image_write_png_texts(const char *path, int width, int height, const uint8_t *rgb8,
+                                     const struct image_attr *attr, int num_attrs, struct err *e);
 
 /* Text that names the libraries: "OpenEXR 3.1.5, libpng 1.6.39". */
 const char *image_library_version(void);

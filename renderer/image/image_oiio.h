@@ -8,15 +8,13 @@
 
 /* Reads OpenEXR, Radiance, PNG, PFM and PNM, told by their first bytes. Integer formats come scaled to [0,1], no
  * colour conversion. Of OpenEXR it is the data window. Refuses, unread, what is larger than the limits of image.h. *half (may be NULL) tells if the file stored fewer than 32 bits per channel. */
-bool image_read(const char *path, struct image *out, bool *half, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool image_read(const char *path, struct image *out, bool *half, struct err *e);
 
 /* Reads the colours of an OpenEXR, PNG, JPEG, Radiance or (by its name's ending) Targa file as channels R, G and B of
  * linear light: for textures. Grey is spread to the three, alpha is left out. OpenEXR and Radiance are linear; PNG is
  * sRGB, or what its gAMA chunk says; JPEG and Targa are sRGB [IEC 61966-2-1]. Refuses more than IMAGE_MAX_TEXELS pixels. */
 enum { IMAGE_MAX_TEXELS = 1 << 26 };
-bool image_read_colours(const char *path, struct image *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool image_read_colours(const char *path, struct image *out, struct err *e);
 
 /* What a file stores, told by its header: for a reader that must know how exact the numbers are. */
 enum image_type {
@@ -33,19 +31,17 @@ struct image_info {
     int orientation;      /* as in Exif: 1 is row 0 at the top, from left to right */
     int parts;            /* images in one file (EXR parts), 1 .. */
     int width, height, channels; /* of OpenEXR: of the display window */
-    bool is_cropped; /* the file holds another rectangle than the image: */
+    bool is_cropped;             /* the file holds another rectangle than the image: */
     int data_x, data_y, data_width, data_height; /* from the image's top left corner */
 };
-bool image_inspect(const char *path, struct image_info *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool image_inspect(const char *path, struct image_info *out, struct err *e);
 
 /* Makes what image_read() found in the file the image that is shown: 0 in all channels where the file has nothing,
  * without what lies outside. */
-bool image_uncrop(const struct image_info *info, struct image *im, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool image_uncrop(const struct image_info *info, struct image *im, struct err *e);
 
 /* The file that it is loaded from. */
-bool image_oiio_file(struct path *path, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool image_oiio_file(struct path *path, struct err *e);
 
 /* Text that names the library: "OpenImageIO 2.4.7"; NULL with a line if it cannot be loaded. */
 const char *image_oiio_version(struct err *e);

@@ -50,12 +50,10 @@ static inline double moments_m3(const struct moments *m, size_t i)
 }
 
 /* All zero, unit "sample", spp 1. */
-bool moments_alloc(struct moments *m, int width, int height, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool moments_alloc(struct moments *m, int width, int height, struct err *e);
 void moments_free(struct moments *m);
 /* The same observations in memory of its own, without a tolerance. */
-bool moments_copy(const struct moments *from, struct moments *to, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool moments_copy(const struct moments *from, struct moments *to, struct err *e);
 
 /* One more observation of one pixel. */
 void moments_add(struct moments *m, size_t pixel, const double x[3]);
@@ -63,8 +61,7 @@ void moments_add(struct moments *m, size_t pixel, const double x[3]);
 void moments_add_image(struct moments *m, const float *pixels_rgb);
 /* dst += src, as if all observations had been added to one [Pebay08 eq. 2.1]. Same sizes, or fails
  * (as it does on different units or spp). */
-bool moments_merge(struct moments *dst, const struct moments *src, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool moments_merge(struct moments *dst, const struct moments *src, struct err *e);
 /* Pixels first .. first+num-1 in the order of their rows, as an image one pixel high for moments_merge(). Owns nothing. */
 struct moments moments_run(const struct moments *m, size_t first, int num);
 /* Rows y .. y+num-1. Owns nothing. */
@@ -75,36 +72,33 @@ double moments_var_of_mean(const struct moments *m, size_t pixel, int channel);
 
 /* A moments EXR: channels R G B (the mean), M2.R M2.G M2.B, M3.R M3.G M3.B, n; text attributes
  * "assay:unit", "assay:spp" and those given (tools/docs/formats/moments-exr.md). float32. */
-bool moments_write(const char *path, const struct moments *m, const struct image_attr *attrs,
-                   int num_attrs, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool moments_write(const char *path, const struct moments *m,
+                             const struct image_attr *attrs, int num_attrs, struct err *e);
 /* The same with the channels of `layers` (same size; NULL: none) after those. */
-bool moments_write_layers(const char *path, const struct moments *m, const struct image *layers,
-                          const struct image_attr *attrs, int num_attrs, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool moments_write_layers(const char *path, const struct moments *m,
+                                    const struct image *layers, const struct image_attr *attrs,
+                                    int num_attrs, struct err *e);
 /* The same for an image that is never in memory as a whole: moments of whole rows come from the top, IMAGE_BAND rows or a
  * multiple of that at a time and the rest last. */
 struct moments_writer;
 /* first: has width, unit and spp of all; layers: has their names. NULL with a line on failure. */
-struct moments_writer *moments_writer_open(const char *path, const struct moments *first,
-                                           int height, const struct image *layers,
-                                           const struct image_attr *attrs, int num_attrs,
-                                           struct err *e) __attribute__((warn_unused_result));
-bool moments_writer_rows(struct moments_writer *w, const struct moments *m,
-                         const struct image *layers, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD struct moments_writer *moments_writer_open(const char *path, const struct moments *first,
+                                                     int height, const struct image *layers,
+                                                     const struct image_attr *attrs, int num_attrs,
+                                                     struct err *e);
+NODISCARD bool moments_writer_rows(struct moments_writer *w, const struct moments *m,
+                                   const struct image *layers, struct err *e);
 /* Both free the writer; the file appears with close. */
-bool moments_writer_close(struct moments_writer *w, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool moments_writer_close(struct moments_writer *w, struct err *e);
 void moments_writer_abandon(struct moments_writer *w);
 /* Reads one. If `image` is not NULL it receives the raw image too (attributes; caller frees). Fails
  * with a line on a file that is not a moments EXR, on half floats, NaN or infinity, negative M2 or
  * n, n not a whole number, or no pixel. */
-bool moments_read(const char *path, struct moments *out, struct image *image, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool moments_read(const char *path, struct moments *out, struct image *image,
+                            struct err *e);
 /* The same, packed. */
-bool moments_read_packed(const char *path, struct moments *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool moments_read_packed(const char *path, struct moments *out, struct err *e);
 /* What is packed as doubles, in place. Fails only out of memory. */
-bool moments_unpack(struct moments *m, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool moments_unpack(struct moments *m, struct err *e);
 
 #endif

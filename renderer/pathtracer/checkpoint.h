@@ -10,13 +10,13 @@
 #include <stdio.h>
 
 /* Appears by rename. */
-bool checkpoint_write(const char *path, const struct render_id *id, const struct film *f,
-                      struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool checkpoint_write(const char *path, const struct render_id *id, const struct film *f,
+                                struct err *e);
 
 /* Fills a film that film_alloc() made. Fails with a line on a missing or damaged file, and on one of
  * another render, naming the first thing that differs. */
-bool checkpoint_read(const char *path, const struct render_id *id, struct film *f, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool checkpoint_read(const char *path, const struct render_id *id, struct film *f,
+                               struct err *e);
 
 /* A state read by rows, for putting together an image that is larger than memory. */
 struct checkpoint {
@@ -28,13 +28,12 @@ struct checkpoint {
     long body;            /* where it begins */
 };
 /* Reads all of it once, to see that it is whole and of that render. */
-bool checkpoint_open(struct checkpoint *s, const char *path, const struct render_id *id, int width,
-                     int height, bool first_hits, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool checkpoint_open(struct checkpoint *s, const char *path, const struct render_id *id,
+                               int width, int height, bool first_hits, struct err *e);
 /* Rows y .. y+num-1 into a film that is at least as wide, from its pixel (at_x, at_y) on; the target too if the
  * film has one. Not film.num_samples. */
-bool checkpoint_rows(struct checkpoint *s, int y, int num, struct film *f, int at_x, int at_y,
-                     struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool checkpoint_rows(struct checkpoint *s, int y, int num, struct film *f, int at_x,
+                               int at_y, struct err *e);
 /* Gives the file back, until checkpoint_rows() wants it again: so any number of states can be read in turn. */
 void checkpoint_close(struct checkpoint *s);
 

@@ -40,11 +40,10 @@ struct options {
 };
 
 /* cli_apart() of a command that options_parse() took. */
-char **options_apart(int argc, char **argv) __attribute__((warn_unused_result));
+NODISCARD char **options_apart(int argc, char **argv);
 /* Fills *o from the command line, with defaults where it is silent. An action other than
  * ACTION_RENDER leaves the rest unchecked, but for the scene of ACTION_CAMERAS. */
-bool options_parse(int argc, char **argv, struct options *o, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool options_parse(int argc, char **argv, struct options *o, struct err *e);
 
 /* What --help, --version and --list say, on stdout; nothing of the other actions. */
 void options_print(const struct options *o);

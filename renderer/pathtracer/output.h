@@ -17,11 +17,11 @@ struct output {
 
 /* All images of the options, each by rename, and beside each PNG of an adaptive render its sampling
  * rates (X.png -> X_rate.png). stats may be NULL while rendering goes on. */
-bool output_images(const struct output *o, const struct film *f, const struct render_stats *stats,
-                   struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool output_images(const struct output *o, const struct film *f,
+                             const struct render_stats *stats, struct err *e);
 
 /* Whether all of these, and the state, could be begun: asked before the render starts. */
-bool output_check(const struct output *o, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool output_check(const struct output *o, struct err *e);
 
 /* For a film that output_images() could not write, for the reason in e: writes all images under names that no
  * file has, beside the first, else in the current directory, else in TMPDIR or /tmp, and adds to the line where they are.
@@ -33,19 +33,18 @@ bool output_rescue(const struct output *o, const struct film *f, const struct re
  * rows (image.h) or a multiple of that at a time and the rest last. Bit by bit the images of the whole film. */
 struct output_writer;
 /* num_samples: film.num_samples of the whole. NULL with a line on failure. */
-struct output_writer *output_open(const struct output *o, int width, int height,
-                                  uint32_t num_samples, const struct render_stats *stats,
-                                  struct err *e) __attribute__((warn_unused_result));
-bool output_rows(struct output_writer *w, const struct film *band, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD struct output_writer *output_open(const struct output *o, int width, int height,
+                                            uint32_t num_samples, const struct render_stats *stats,
+                                            struct err *e);
+NODISCARD bool output_rows(struct output_writer *w, const struct film *band, struct err *e);
 /* Both free the writer; the images appear with close. */
-bool output_close(struct output_writer *w, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool output_close(struct output_writer *w, struct err *e);
 void output_abandon(struct output_writer *w);
 
 /* IMAGE.state beside the first image, or beside `image` if that is not NULL. */
 enum { CHECKPOINT_PATH = 4096 };
-bool output_state_path(const struct output *o, const char *image, char path[CHECKPOINT_PATH],
-                       struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool output_state_path(const struct output *o, const char *image,
+                                 char path[CHECKPOINT_PATH], struct err *e);
 
 /* The assignment's colours of a sampling rate n/most: blue (0) through green (1/2) to red (1). */
 void rate_colour(double rate, uint8_t rgb8[3]);

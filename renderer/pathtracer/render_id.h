@@ -16,12 +16,12 @@ struct render_id {
 };
 
 /* Reads scene and camera file and what else the loaded scene is from to hash them. */
-bool render_id_make(const struct options *o, const struct scene *s, struct render_id *id,
-                    struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool render_id_make(const struct options *o, const struct scene *s, struct render_id *id,
+                              struct err *e);
 
 /* X Y DX DY and the W and H of the whole -> "X Y DX DY of W H". */
 void render_id_cell(const int cell[4], int width, int height, char text[64]);
 /* "X Y DX DY of W H" -> six numbers; false on anything else or a cell that is not inside. */
-bool render_id_parse_cell(const char *text, int cell[6]) __attribute__((warn_unused_result));
+NODISCARD bool render_id_parse_cell(const char *text, int cell[6]);
 
 #endif

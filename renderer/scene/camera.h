@@ -24,16 +24,15 @@ struct camera {
  * re-places the eye on the file's viewing direction at 1.5 bounding-box diagonals, fits the angle
  * at 800x600 and crops to the size asked for (notes in renderer/README.md). Pinhole. Fails if a
  * COLLADA file has no camera. */
-bool camera_init(struct camera *c, const struct scene *s, int width, int height, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool camera_init(struct camera *c, const struct scene *s, int width, int height,
+                           struct err *e);
 
 /* Of a camera of the CGL dialect: shows in any size what the assignment shows at 800 x 600, or as much as fits. */
 void camera_show_whole(struct camera *c);
 
 /* Replaces pose and angles by those of a camera file of the assignment (its key D writes them).
  * The image's size stays. */
-bool camera_read_file(struct camera *c, const char *path, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool camera_read_file(struct camera *c, const char *path, struct err *e);
 
 /* The ray through (x, y) in pixels, origin at the top left corner, lens point (u, v) in [0,1)^2. */
 ray camera_ray(const struct camera *c, float x, float y, float u, float v);

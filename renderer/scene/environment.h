@@ -29,20 +29,17 @@ struct environment_parts {
 };
 
 /* The same from everywhere. All four of these return NULL on failure, and the caller frees. */
-struct environment *environment_constant(rgb radiance, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD struct environment *environment_constant(rgb radiance, struct err *e);
 /* The assignment's ambient light: constant from the half space y > 0, nothing from below, and
  * hidden. */
-struct environment *environment_upper_half(rgb radiance, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD struct environment *environment_upper_half(rgb radiance, struct err *e);
 /* Channels R, G and B of an image. `where` starts the error line. Fails if they are not there, on a
  * texel that is negative or not finite (which it names), and if all are black. */
-struct environment *environment_from_image(const struct image *im, const char *where, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD struct environment *environment_from_image(const struct image *im, const char *where,
+                                                     struct err *e);
 /* The same of an .exr or .hdr file, whose numbers are radiance. Other kinds of files are refused:
  * their numbers are not linear. */
-struct environment *environment_read(const char *path, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD struct environment *environment_read(const char *path, struct err *e);
 void environment_free(struct environment *env);
 
 /* Radiance that arrives from direction w (unit). */

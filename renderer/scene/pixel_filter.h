@@ -23,11 +23,10 @@ extern const char *const pixel_filter_names[]; /* by enum pixel_filter_kind; end
 
 /* Radius from 0.5, as less would leave light between the pixels out, to 16; sigma, of Gauss alone, from 0.05 to 8. Fails on
  * any other. */
-bool pixel_filter_make(struct pixel_filter *f, enum pixel_filter_kind kind, double radius,
-                       double sigma, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool pixel_filter_make(struct pixel_filter *f, enum pixel_filter_kind kind, double radius,
+                                 double sigma, struct err *e);
 /* "box:1", "tent:1", "gauss:SIGMA:RADIUS"; without a radius box:0.5, tent:1, six sigmas of Gauss. */
-bool pixel_filter_parse(const char *text, struct pixel_filter *f, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool pixel_filter_parse(const char *text, struct pixel_filter *f, struct err *e);
 /* The same text again. */
 void pixel_filter_print(const struct pixel_filter *f, char text[PIXEL_FILTER_TEXT]);
 

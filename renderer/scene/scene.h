@@ -192,19 +192,16 @@ static inline bool material_has_map(const struct material *m)
  * normal not of unit length, a negative reflectance or radiance, a reflectance above 1 (a texture's
  * counts), or a texture on a sphere or a coordinate of it beyond 1e6; `where` starts the line. A scene without
  * primitives is fine. */
-bool scene_finish(struct scene *s, const char *where, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool scene_finish(struct scene *s, const char *where, struct err *e);
 
 /* Sees by the first camera of that name. False if there is none. */
-bool scene_choose_camera(struct scene *s, const char *name) __attribute__((warn_unused_result));
+NODISCARD bool scene_choose_camera(struct scene *s, const char *name);
 
 /* Adds an environment, and its light behind all others, to a scene that is complete. The scene owns
  * it from then on; on failure (there is one already; out of memory) the caller still does. */
-bool scene_add_environment(struct scene *s, struct environment *env, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool scene_add_environment(struct scene *s, struct environment *env, struct err *e);
 /* The same of a file (environment_read()); each failure is a line with its path. */
-bool scene_read_environment(struct scene *s, const char *path, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool scene_read_environment(struct scene *s, const char *path, struct err *e);
 
 /* A map (not 0) at barycentric coordinates (b1, b2) of a triangle. */
 static inline rgb scene_map_at(const struct scene *s, uint32_t map, uint32_t triangle, float b1,

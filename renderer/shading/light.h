@@ -15,8 +15,7 @@ enum { MANY_LIGHTS = 16 };
 struct light_table; /* per-scene tables for choosing lights and triangles; opaque */
 
 /* NULL on failure (out of memory, more lights than DISCRETE_MOST). Refers to the scene. */
-struct light_table *light_table_build(const struct scene *s, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD struct light_table *light_table_build(const struct scene *s, struct err *e);
 void light_table_free(struct light_table *t);
 
 /* A light and the probability with which it was chosen; 0: none. */

@@ -6,14 +6,14 @@
 #ifndef ASSAY_LIGHT_CHOICE_H
 #define ASSAY_LIGHT_CHOICE_H
 
+#include "renderer/base/err.h"
 #include "renderer/math/vec.h"
 
 #include <stdint.h>
 
 /* What the weight of a light, or of several, is made of. */
 struct light_bounds {
-    bool
-        near; /* the sphere is around the light; else the light is infinitely far, and around its unit direction */
+    bool near; /* the sphere is around the light; else infinitely far, around its unit direction */
     vec3 centre; /* of the sphere */
     float radius;
     vec3 axis;        /* of the cone, unit: surfaces' normals, or what spots shine along */
@@ -30,8 +30,7 @@ enum { MOST_CLUSTERS = 32 };
 struct light_clusters; /* opaque; const once made */
 
 /* Of n lights, 2^23 at most; NULL if out of memory. Uses b for itself, and does not refer to it. */
-struct light_clusters *light_clusters_build(struct light_bounds *b, uint32_t n)
-    __attribute__((warn_unused_result));
+NODISCARD struct light_clusters *light_clusters_build(struct light_bounds *b, uint32_t n);
 void light_clusters_free(struct light_clusters *t);
 
 #endif

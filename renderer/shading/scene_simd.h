@@ -55,8 +55,7 @@ struct scene_simd {
 /* Fills the record of a material. */
 void scene_simd_material(const struct material *m, float record[MATERIAL_WORDS]);
 /* NULL if out of memory. Does not refer to the scene. */
-struct scene_simd *scene_simd_build(const struct scene *s, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD struct scene_simd *scene_simd_build(const struct scene *s, struct err *e);
 void scene_simd_free(struct scene_simd *l);
 
 #endif

@@ -28,8 +28,7 @@ struct film {
 };
 
 /* All zero, without target. */
-bool film_alloc(struct film *f, int width, int height, bool first_hits, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool film_alloc(struct film *f, int width, int height, bool first_hits, struct err *e);
 void film_free(struct film *f);
 
 /* The unit of its moments: samples of any but the independent sampler are stratified. */
@@ -39,8 +38,8 @@ void film_add_first_hit(struct film *f, size_t pixel, const struct first_hits *h
 
 /* Adds the samples of pixels first .. first+num-1 of src, which come after those that dst has of these pixels, by moments_merge(). Both are
  * films of the same size, with the same layers; targets and film.num_samples are not looked at. */
-bool film_merge(struct film *dst, const struct film *src, size_t first, int num, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool film_merge(struct film *dst, const struct film *src, size_t first, int num,
+                          struct err *e);
 
 /* Root mean square over the pixels of the standard error of luminance, over the mean luminance of the
  * image. INFINITY while a pixel has fewer than two samples or the image is black. */
@@ -51,8 +50,7 @@ double film_relative_error(const struct film *f);
  * A variance that one sample cannot tell is INFINITY; depth.Z is the distance from the plane through
  * the eye, along the viewing axis, in scene units, averaged over depth.hits samples, and 1e10 where
  * there are none, as Blender has it; normals are in world space, their means not of unit length. */
-bool film_layers(const struct film *f, struct image *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool film_layers(const struct film *f, struct image *out, struct err *e);
 
 enum { NUM_LAYERS = 15 };
 extern const char *const layer_names[NUM_LAYERS];

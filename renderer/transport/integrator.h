@@ -126,7 +126,7 @@ static inline bool chooses_light(const struct integrator *it)
 
 /* Fills it->stages and it->records as it->opt.isa asks, for the scene in *it; false if out of
  * memory or if the machine lacks the instructions. integrator_free() afterwards, in either case. */
-bool integrator_prepare(struct integrator *it, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool integrator_prepare(struct integrator *it, struct err *e);
 void integrator_free(struct integrator *it);
 
 extern const char *const integrator_kind_names[]; /* end with NULL */

@@ -59,14 +59,14 @@ struct render_stats {
  * result depends only on scene, camera, options and, if it stops early, on the number of samples by
  * then; never on threads or on how often it was stopped. A pilot that is stopped leaves nothing and
  * starts again. control may be NULL. */
-bool render_film(const struct scene *s, const struct camera *c, const struct bvh *bvh,
-                 const struct render_options *opt, const struct render_control *control,
-                 struct progress *progress, struct film *film, struct render_stats *stats,
-                 struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool render_film(const struct scene *s, const struct camera *c, const struct bvh *bvh,
+                           const struct render_options *opt, const struct render_control *control,
+                           struct progress *progress, struct film *film, struct render_stats *stats,
+                           struct err *e);
 
 /* The same from the start to the end into *out (one path each; the caller frees). */
-bool render(const struct scene *s, const struct camera *c, const struct bvh *bvh,
-            const struct render_options *opt, struct progress *progress, struct moments *out,
-            struct render_stats *stats, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool render(const struct scene *s, const struct camera *c, const struct bvh *bvh,
+                      const struct render_options *opt, struct progress *progress,
+                      struct moments *out, struct render_stats *stats, struct err *e);
 
 #endif

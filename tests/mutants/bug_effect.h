@@ -5,8 +5,7 @@
 #include "tools/diagnose/catalogue.h"
 
 /* All NAME.patch of a directory into c->bug, beside those that are there, by name; catalogue_free() frees it. */
-bool bug_list(const char *dir, struct catalogue *c, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool bug_list(const char *dir, struct catalogue *c, struct err *e);
 
 /* The mean of bug[k] - correct[k] over `batches` of the same seeds each. Its variance is that of independent renders,
  * var bug + var correct, times `level`; 0: times the level at which the differences scatter over the batches. more[] is

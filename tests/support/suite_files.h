@@ -27,6 +27,6 @@ enum { SKY_WIDTH = 128, SKY_HEIGHT = 64, SKY_TURN = 1 };
 void suite_sky_radiance(const double d[3], double radiance[3]);
 /* The image in latitude and longitude as environment.h has it: the radiance at the middles of texels,
  * rounded to 1/256, moved `turn` columns to the right. Channels R, G, B. The caller frees. */
-bool suite_sky(int turn, struct image *out, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool suite_sky(int turn, struct image *out, struct err *e);
 
 #endif

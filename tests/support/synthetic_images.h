@@ -22,8 +22,8 @@ struct library {
 };
 
 /* Fails only out of memory. Release with library_free(). */
-bool library_init(struct library *l, enum law law, int n, size_t num, uint64_t seed, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool library_init(struct library *l, enum law law, int n, size_t num, uint64_t seed,
+                            struct err *e);
 void library_free(struct library *l);
 /* Draws `num` blocks anew, the oldest first. */
 void library_renew(struct library *l, size_t num);

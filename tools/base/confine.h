@@ -25,8 +25,8 @@ size_t confine_filter(bool alone, unsigned char filter[CONFINE_FILTER]);
 
 /* A Landlock ruleset: may read and run `read`, and do as it likes in `write` (NULL at the end); never what is in `hidden`, real paths,
  * even where a directory of `read` holds them. Paths that are not there are left out. *ruleset is -1 where the kernel has no Landlock. */
-bool confine_files(const char *const *read, const char *const *write, const char *const *hidden,
-                   int *ruleset, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool confine_files(const char *const *read, const char *const *write,
+                             const char *const *hidden, int *ruleset, struct err *e);
 
 /* For struct process: becomes what *ctx, a struct confine, says. Only calls that may follow fork(). */
 bool confine_enter(const void *ctx);

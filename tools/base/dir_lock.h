@@ -16,8 +16,7 @@ struct dir_lock {
  * ends with the process, however that ends. Where nothing can be locked (some network file systems) it is taken all the
  * same. The caller calls dir_lock_release(), which removes a directory that was made here and has stayed empty; a lock that is
  * zero may be released, too. */
-bool dir_lock_take(struct dir_lock *l, const char *dir, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool dir_lock_take(struct dir_lock *l, const char *dir, struct err *e);
 void dir_lock_release(struct dir_lock *l);
 
 #endif

@@ -7,7 +7,6 @@
 /* Of a file: its SHA-256, lower-case hex. Of a directory: the SHA-256 of the text of lines "KIND HASH NAME" of what is in it,
  * sorted by name, the hashes of its directories made in the same way; links by where they point. `except`: a name in
  * the top directory that is left out; NULL: none. Fails with a line on what cannot be read. */
-bool hash_tree(const char *path, const char *except, char hex[65], struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool hash_tree(const char *path, const char *except, char hex[65], struct err *e);
 
 #endif

@@ -12,10 +12,10 @@ struct run_user {
 };
 
 /* One that nobody uses now and of whom nothing is left. The caller calls run_user_release(). */
-bool run_user_take(struct run_user *u, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool run_user_take(struct run_user *u, struct err *e);
 
 /* Ends all processes of it, however often they fork, and waits until they are gone. */
-bool run_user_end(const struct run_user *u, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool run_user_end(const struct run_user *u, struct err *e);
 
 /* Ends them and removes its System V objects and its files where everybody may write (/tmp, /var/tmp, /dev/shm, /dev/mqueue, /run/lock).
  * False: something of it is left; it is given back all the same, and not taken again while that is so. */

@@ -85,19 +85,19 @@ struct sandbox_result {
  * with `unsafe` nothing is asked but that a program can be run. hidden: files and directories (NULL at the end) that no
  * program may read; only those below /usr need it. Our own programs and other renderers there are hidden besides. Makes out->dir. The
  * caller calls sandbox_close(). */
-bool sandbox_open(bool unsafe, const char *const *hidden, struct sandbox *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool sandbox_open(bool unsafe, const char *const *hidden, struct sandbox *out,
+                            struct err *e);
 /* Removes out->dir. */
 void sandbox_close(struct sandbox *s);
 
 /* One program. False only if the run could not be made, which is our trouble or the machine's; what the program
  * did wrong is in *out. May be called from several threads. */
-bool sandbox_run(const struct sandbox *s, const struct sandbox_job *job, struct sandbox_result *out,
-                 struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool sandbox_run(const struct sandbox *s, const struct sandbox_job *job,
+                           struct sandbox_result *out, struct err *e);
 
 /* A tar of a directory (or of one file) for struct sandbox_job, at most `most` bytes: links stay links. *too_large: it fails because of
  * that, and of nothing else. */
-bool sandbox_pack(const char *path, const char *tar, size_t most, bool *too_large, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool sandbox_pack(const char *path, const char *tar, size_t most, bool *too_large,
+                            struct err *e);
 
 #endif

@@ -31,8 +31,7 @@ void sandbox_conclude(const struct sandbox_job *job, const char *word, const str
                       struct sandbox_result *r);
 
 /* sandbox_run() where s->unsafe. */
-bool sandbox_run_bare(const struct sandbox *s, const struct sandbox_job *job,
-                      struct sandbox_result *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool sandbox_run_bare(const struct sandbox *s, const struct sandbox_job *job,
+                                struct sandbox_result *out, struct err *e);
 
 #endif

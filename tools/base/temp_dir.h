@@ -11,8 +11,7 @@ struct temp_dir {
 
 /* Makes $TMPDIR/assay-NAME-HOST.XXXXXX, mode 0700. Before that, those of the same name, host and user whose runs are over, which
  * a kill has left, are removed; what cannot be removed stays. The caller calls temp_dir_close(), before whom no other process of this kind touches it. */
-bool temp_dir_open(struct temp_dir *d, const char *name, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool temp_dir_open(struct temp_dir *d, const char *name, struct err *e);
 
 /* Removes it, with all that is in it; false with a line if that fails. Nothing where it is closed or was never opened (zero). */
 bool temp_dir_close(struct temp_dir *d, struct err *e);

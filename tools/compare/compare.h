@@ -101,9 +101,9 @@ struct comparison {
  * unit, noise in an exact side, replicates without any variance (the seed was ignored), the same
  * observations on both sides, a black reference, options out of range. A is the tested side, B the reference. The caller frees with
  * comparison_free(). */
-bool compare_moments(const struct moments *a, const struct moments *b,
-                     const struct compare_options *opt, struct comparison *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool compare_moments(const struct moments *a, const struct moments *b,
+                               const struct compare_options *opt, struct comparison *out,
+                               struct err *e);
 void comparison_free(struct comparison *c);
 
 #endif

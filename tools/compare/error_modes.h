@@ -59,8 +59,8 @@ struct error_modes {
 };
 
 /* At least 2 pixels. Fails only out of memory. Release with error_modes_free(). */
-bool error_modes_open(const struct moments *a, const struct moments *b, struct error_modes *out,
-                      struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool error_modes_open(const struct moments *a, const struct moments *b,
+                                struct error_modes *out, struct err *e);
 void error_modes_free(struct error_modes *modes);
 
 /* Whether the direction exists for this size of image. */

@@ -8,7 +8,7 @@
  * that remains, noise removed (tools/docs/background/verdict.md, "Naming"). Unless c is EQUIVALENT, c->hint becomes the one
  * that removes most, if that is at least nine tenths, and c->reason ends with it. Flips and exchanges come first,
  * where several remove as much. Of large images a part is looked at. Fails only out of memory. */
-bool hint_add(const struct moments *a, const struct moments *b, struct comparison *c, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool hint_add(const struct moments *a, const struct moments *b, struct comparison *c,
+                        struct err *e);
 
 #endif

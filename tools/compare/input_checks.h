@@ -7,8 +7,7 @@
 
 /* Each failure is a line in e: see compare_moments(). On success *j holds all that regions share but
  * what the number of regions decides (z_guard, num_tests). */
-bool input_checks_run(const struct moments *a, const struct moments *b,
-                      const struct compare_options *opt, struct judge *j, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool input_checks_run(const struct moments *a, const struct moments *b,
+                                const struct compare_options *opt, struct judge *j, struct err *e);
 
 #endif

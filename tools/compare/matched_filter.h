@@ -18,9 +18,8 @@ struct matched_filter {
 };
 
 /* Fails only out of memory. Release with matched_filter_free(). */
-bool matched_filter_open(const struct moments *a, const struct moments *b,
-                         struct matched_filter *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool matched_filter_open(const struct moments *a, const struct moments *b,
+                                   struct matched_filter *out, struct err *e);
 void matched_filter_free(struct matched_filter *f);
 
 /* Rows y .. y+rows-1, which follow those before. root[i] gets, of A's and B's pixels, what pyramid_rebuild() wants. */

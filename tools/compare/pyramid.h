@@ -78,13 +78,12 @@ int pyramid_tiles(int length, int tile);
 struct pyramid pyramid_levels(int width, int height, int tile);
 
 /* Same sizes. Fails only out of memory. Release with pyramid_free(). */
-bool pyramid_build(const struct moments *a, const struct moments *b, int channel, int tile,
-                   struct pyramid *out, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool pyramid_build(const struct moments *a, const struct moments *b, int channel,
+                             int tile, struct pyramid *out, struct err *e);
 /* The same in the memory of one that was built before, or is zero. root: of both sides' pixels, of luminance,
  * sum w_c cbrt k3_c, which is most of the work, where that is known; NULL: not. */
-bool pyramid_rebuild(const struct moments *a, const struct moments *b, int channel,
-                     double *const root[2], int tile, struct pyramid *p, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool pyramid_rebuild(const struct moments *a, const struct moments *b, int channel,
+                               double *const root[2], int tile, struct pyramid *p, struct err *e);
 void pyramid_free(struct pyramid *p);
 
 /* The same in two parts, in less memory. An image is cut from the top into bands of so many rows, the last of up to twice as
@@ -92,8 +91,7 @@ void pyramid_free(struct pyramid *p);
 int pyramid_band(const struct pyramid *levels);
 /* Levels from the tile's on, which is number 0, are made of its cells, zeroed here and added to by the caller, by
  * pyramid_sum_up(). Fails and is released as above. */
-bool pyramid_above(const struct pyramid *levels, struct pyramid *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool pyramid_above(const struct pyramid *levels, struct pyramid *out, struct err *e);
 void pyramid_sum_up(struct pyramid *above);
 
 void pyramid_add_pixel(struct cell *dst, const struct estimate *a, const struct estimate *b);

@@ -44,13 +44,12 @@ struct converge_progress {
  * the CPU time of one replicate, its share of the engine's start included. *version (NULL where the
  * engine does not say) is a new string, free() it. Fails where an engine cannot express the scene, where
  * its answer has no noise, and on a number of samples it cannot render. */
-bool converge_render(const struct converge_job *job, enum converge_engine engine, int rung, int spp,
-                     float *images, double *cpu_s, char **version,
-                     const struct converge_progress *progress, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool converge_render(const struct converge_job *job, enum converge_engine engine,
+                               int rung, int spp, float *images, double *cpu_s, char **version,
+                               const struct converge_progress *progress, struct err *e);
 
 /* One long run of our independent sampler with a seed of its own: moments over samples. */
-bool converge_render_own(const struct converge_job *job, int spp, struct moments *out,
-                         struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool converge_render_own(const struct converge_job *job, int spp, struct moments *out,
+                                   struct err *e);
 
 #endif

@@ -41,7 +41,7 @@ struct converge_options {
 /* Fills *results (results.h; a new reference): no claims, but "convergence" (convergence_results.h). Writes no
  * file that stays. An engine that cannot be judged is in the results with its error; false only if
  * nothing could be judged at all. */
-bool converge_run(const struct converge_options *opt, int argc, char **argv, json_t **results,
-                  struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool converge_run(const struct converge_options *opt, int argc, char **argv,
+                            json_t **results, struct err *e);
 
 #endif

@@ -10,7 +10,8 @@
  * mean over the image; se: its standard error for channels that err together (an upper bound). truth: of the closed
  * form, where `truth` (may be NULL) holds at that depth. All images have the same seed, so that steps are less noisy
  * than the values. Fails where an image cannot be rendered. */
-bool depth_ladder_measure(const struct converge_job *job, const struct suite_reference *truth,
-                          int spp, json_t **out, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool depth_ladder_measure(const struct converge_job *job,
+                                    const struct suite_reference *truth, int spp, json_t **out,
+                                    struct err *e);
 
 #endif

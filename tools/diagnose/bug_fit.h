@@ -29,9 +29,8 @@ extern const double bug_fit_model_error, bug_fit_rounding;
 extern const double bug_fit_largest_excess;
 
 /* Clues and catalogue have to outlive it. The caller ends it. */
-bool bug_fit_start(const struct catalogue *c, const struct observation *clue, int num_clues,
-                   double clip, struct bug_fit *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool bug_fit_start(const struct catalogue *c, const struct observation *clue,
+                             int num_clues, double clip, struct bug_fit *out, struct err *e);
 void bug_fit_end(struct bug_fit *f);
 
 /* What two bugs do to a view: where each changes a cell by a factor, the product of both; with `adds`, where the correct image

@@ -59,15 +59,14 @@ struct catalogue {
 };
 
 /* Fails, with a line, on a missing or damaged file. */
-bool catalogue_read(const char *dir, struct catalogue *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool catalogue_read(const char *dir, struct catalogue *out, struct err *e);
 void catalogue_free(struct catalogue *c);
 
 /* The scene and the variant (NULL: none) of a view. Fails if the suite has no such, or if the scene is not
  * the one that the catalogue was made with. */
-bool catalogue_view_scene(const struct view *v, const struct suite *suite,
-                          const struct suite_scene **scene, const struct suite_variant **variant,
-                          struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool catalogue_view_scene(const struct view *v, const struct suite *suite,
+                                    const struct suite_scene **scene,
+                                    const struct suite_variant **variant, struct err *e);
 const struct view *catalogue_view(const struct catalogue *c, const char *name);
 /* Its number, -1 if there is none. */
 int catalogue_bug(const struct catalogue *c, const char *name);

@@ -59,9 +59,8 @@ struct diagnosis {
 };
 
 /* clues: at least one, of views of c, each seen at most once and independent of each other. */
-bool diagnose(const struct catalogue *c, const struct observation *clue, int num_clues,
-              const struct diagnose_options *opt, struct diagnosis *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool diagnose(const struct catalogue *c, const struct observation *clue, int num_clues,
+                        const struct diagnose_options *opt, struct diagnosis *out, struct err *e);
 
 struct evidence diagnose_evidence(const struct catalogue *c, const struct observation *clue,
                                   const struct candidate *candidate);

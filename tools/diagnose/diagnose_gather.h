@@ -19,21 +19,20 @@ struct diagnose_gather_options {
 /* At most catalogue->num_views of them, in clue[]; the number in *num. */
 
 /* Renders every view with `program`. */
-bool diagnose_gather_program(const struct diagnose_gather_options *opt, const char *program,
-                             struct observation *clue, int *num, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool diagnose_gather_program(const struct diagnose_gather_options *opt,
+                                       const char *program, struct observation *clue, int *num,
+                                       struct err *e);
 
 /* Of the images and claims of consistency of a results.json by `assay validate`; of one with --engine, that engine's
  * images, of which only the means are held against bugs, as its noise may rightly be another. Views that it has no
  * image of, or of another shape, are left out and appended to `skipped` as {"view": , "reason": }. Fails
  * if none is left. */
-bool diagnose_gather_results(const struct diagnose_gather_options *opt, const char *path,
-                             struct observation *clue, int *num, json_t *skipped, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool diagnose_gather_results(const struct diagnose_gather_options *opt, const char *path,
+                                       struct observation *clue, int *num, json_t *skipped,
+                                       struct err *e);
 
 /* One moments image of the view of that name. */
-bool diagnose_gather_image(const struct diagnose_gather_options *opt, const char *view,
-                           const char *path, struct observation *clue, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool diagnose_gather_image(const struct diagnose_gather_options *opt, const char *view,
+                                     const char *path, struct observation *clue, struct err *e);
 
 #endif

@@ -19,7 +19,7 @@ struct diagnose_job {
 };
 
 /* consistent (may be NULL): false if a claim of consistency (stated_error.h) comes out DIFFERENT at `alpha`. */
-bool diagnose_render(const struct diagnose_job *job, double alpha, struct signature *out,
-                     bool *consistent, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool diagnose_render(const struct diagnose_job *job, double alpha, struct signature *out,
+                               bool *consistent, struct err *e);
 
 #endif

@@ -40,8 +40,8 @@ struct signature {
 /* columns: cells across, at most SIGNATURE_SIDE. asked: samples per pixel that were asked for; 0: not known. Fails on sides that are not whole numbers of
  * cells, on pixels with fewer than 2 observations, and on moments that do not state an error ("stratified",
  * "exact"). FACT_SAMPLES is known if `asked` is. */
-bool signature_of(const struct moments *m, int columns, double asked, struct signature *out,
-                  struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool signature_of(const struct moments *m, int columns, double asked,
+                            struct signature *out, struct err *e);
 
 /* Over cells and channels. */
 double signature_mean(const struct signature *s);
@@ -67,7 +67,6 @@ struct signature signature_as_noisy_as(const struct signature *s, const struct s
 
 /* The same as moments over cells, for compare_moments(): n, M2 and M3 such that the variance and the third
  * cumulant of the mean are those of the sight. The caller frees them. */
-bool signature_moments(const struct signature *s, struct moments *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool signature_moments(const struct signature *s, struct moments *out, struct err *e);
 
 #endif

@@ -39,16 +39,16 @@ struct permutation {
 };
 
 /* Fails with a line if sizes differ, an image is in both, none varies, or B is black. */
-bool permutation_test(const struct replicate_dir *a, const struct replicate_dir *b,
-                      const struct permutation_options *opt, struct permutation *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool permutation_test(const struct replicate_dir *a, const struct replicate_dir *b,
+                                const struct permutation_options *opt, struct permutation *out,
+                                struct err *e);
 
 /* A second stage on fresh replicates: the region of `first` alone, in its direction, at opt->alpha.
  * Everything in out but mdb, mdb_tile (0) and min_side is of that one test. */
-bool permutation_confirm(const struct permutation *first, const struct replicate_dir *a2,
-                         const struct replicate_dir *b2, const struct permutation_options *opt,
-                         struct permutation *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool permutation_confirm(const struct permutation *first, const struct replicate_dir *a2,
+                                   const struct replicate_dir *b2,
+                                   const struct permutation_options *opt, struct permutation *out,
+                                   struct err *e);
 
 /* Replicates a side for a smallest p, one- or two-sided, of at most alpha; 0 if random labellings
  * cannot reach it. */

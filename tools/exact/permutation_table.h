@@ -20,13 +20,12 @@ struct permutation_table {
 /* All squares of sides min_side, 2 min_side, .. up to the image, in R, G, B and luminance; the last
  * is the luminance of the image. min_side 0: the smallest power of 2 that leaves at most 1024 squares
  * a channel. Release with permutation_table_free(), also after a failure. */
-bool permutation_table_make(const struct replicate_dir *a, const struct replicate_dir *b,
-                            int min_side, struct permutation_table *t, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool permutation_table_make(const struct replicate_dir *a, const struct replicate_dir *b,
+                                      int min_side, struct permutation_table *t, struct err *e);
 /* One region alone. */
-bool permutation_table_make_one(const struct replicate_dir *a, const struct replicate_dir *b,
-                                struct rect rect, int channel, struct permutation_table *t,
-                                struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool permutation_table_make_one(const struct replicate_dir *a,
+                                          const struct replicate_dir *b, struct rect rect,
+                                          int channel, struct permutation_table *t, struct err *e);
 void permutation_table_free(struct permutation_table *t);
 
 #endif

@@ -65,8 +65,9 @@ struct sign_flip {
 };
 
 /* Fails with a line where no pixel of any pair differs, and out of memory. */
-bool sign_flip_test(const struct sign_flip_images *in, const struct sign_flip_options *opt,
-                    struct sign_flip *out, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool sign_flip_test(const struct sign_flip_images *in,
+                              const struct sign_flip_options *opt, struct sign_flip *out,
+                              struct err *e);
 
 /* log10 of the bound on P(|sum of s e| >= |sum of s|), s of num > 0 numbers, not all 0; at most 0. */
 double sign_flip_log10_p(const double *s, size_t num);

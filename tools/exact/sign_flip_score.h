@@ -18,7 +18,7 @@ struct sheet {
 };
 
 /* width, height and num are set. Fails only out of memory. Release with sheet_free(). */
-bool sheet_alloc(struct sheet *s, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool sheet_alloc(struct sheet *s, struct err *e);
 void sheet_free(struct sheet *s);
 
 /* The channel's values, in the middles of cells of filter x filter pixels. */

@@ -9,9 +9,9 @@
 /* Renders into --out what is neither there nor in --golden and of this scene and these settings, of ours (both samplers) and of
  * each engine that the scene has as a reference. Images of other engines are half as large on both sides, where that
  * divides: they take minutes. made: one word for all that this command renders. */
-bool noise_record_render(const struct reference_command *c, const struct suite_scene *scene,
-                         const char *pathtracer, const char *made, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool noise_record_render(const struct reference_command *c,
+                                   const struct suite_scene *scene, const char *pathtracer,
+                                   const char *made, struct err *e);
 
 /* Approves every candidate of the scene. Each is compared with what is stored, with a stale one too: the variance of a sample
  * and of the last rung, by the margins that the stored one declares; of ours only an increase is DIFFERENT. Adds to

@@ -22,18 +22,18 @@ struct reference_command {
 
 /* Reads the words and the suite, and makes the directory for temporary files. help: it was printed, and no more was
  * done. The caller calls reference_options_free(), also after a failure. */
-bool reference_options_read(int argc, char **argv, struct reference_command *c, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool reference_options_read(int argc, char **argv, struct reference_command *c,
+                                      struct err *e);
 void reference_options_free(struct reference_command *c);
 
 /* Is the scene asked for, and has references of its own? */
 bool reference_options_selects(const struct reference_command *c, const struct suite_scene *scene);
 /* Calls one() for each reference that is asked for, in the order of the suite, as long as it returns true. Fails if there is
  * none. */
-bool reference_options_each(const struct reference_command *c,
-                            bool (*one)(void *ctx, const struct suite_scene *scene,
-                                        const struct suite_reference *ref, struct err *e),
-                            void *ctx, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool reference_options_each(const struct reference_command *c,
+                                      bool (*one)(void *ctx, const struct suite_scene *scene,
+                                                  const struct suite_reference *ref, struct err *e),
+                                      void *ctx, struct err *e);
 
 /* How one of them would be made, and where it is up to date already. */
 struct reference_state {
@@ -41,17 +41,20 @@ struct reference_state {
     char key[65];                 /* reference_key() */
     const char *there;            /* --golden or --out; NULL: to be rendered */
 };
-bool reference_options_state(const struct reference_command *c, const struct suite_scene *scene,
-                             const struct suite_reference *ref, struct reference_state *out,
-                             struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool reference_options_state(const struct reference_command *c,
+                                       const struct suite_scene *scene,
+                                       const struct suite_reference *ref,
+                                       struct reference_state *out, struct err *e);
 /* Says that it is up to date; a candidate that is older than what is stored is removed. */
-bool reference_options_keep(const struct reference_command *c, const struct suite_scene *scene,
-                            const struct suite_reference *ref, const struct reference_state *state,
-                            struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool reference_options_keep(const struct reference_command *c,
+                                      const struct suite_scene *scene,
+                                      const struct suite_reference *ref,
+                                      const struct reference_state *state, struct err *e);
 /* Writes it to --out with the key in its manifest, and says so. */
-bool reference_options_write(const struct reference_command *c, const struct suite_scene *scene,
-                             const struct suite_reference *ref, const char *key,
-                             const struct moments *m, json_t *manifest, double seconds,
-                             struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool reference_options_write(const struct reference_command *c,
+                                       const struct suite_scene *scene,
+                                       const struct suite_reference *ref, const char *key,
+                                       const struct moments *m, json_t *manifest, double seconds,
+                                       struct err *e);
 
 #endif

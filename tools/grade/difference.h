@@ -47,9 +47,9 @@ struct difference {
  * alpha is that of all intervals together. A tile with less than a quarter of its pixels in use is not judged. Fails
  * where less than a quarter of the image can be compared, or B is black: a line fit for the student. The caller
  * frees with difference_free(). */
-bool difference_measure(const struct submitted_image *a, const struct submitted_image *b,
-                        const unsigned char *use, double alpha, struct difference *out,
-                        struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool difference_measure(const struct submitted_image *a, const struct submitted_image *b,
+                                  const unsigned char *use, double alpha, struct difference *out,
+                                  struct err *e);
 void difference_free(struct difference *a);
 
 /* kappa of the image. */
@@ -64,9 +64,10 @@ void difference_kappas(const struct submitted_image *a, const struct submitted_i
 /* Do the errors of two runs, in second differences, go together more than those of independent runs, by 6 standard
  * deviations? (Products of independent errors: variance 1/n, times 4 for overlap and 3 for channels alike; what the noise of
  * the reference adds to both is taken off.) Errors as fine as a pixel that both runs make look the same; either way the mean of the two is worth no more than one. */
-bool difference_correlated(const struct submitted_image *a, const struct submitted_image *b,
-                           const struct submitted_image *reference, const unsigned char *use)
-    __attribute__((warn_unused_result));
+NODISCARD bool difference_correlated(const struct submitted_image *a,
+                                     const struct submitted_image *b,
+                                     const struct submitted_image *reference,
+                                     const unsigned char *use);
 
 /* Does green of an image go with that of another one of its scene, from pixel to pixel, beyond 5 standard deviations? */
 bool difference_related(const struct submitted_image *s, const struct submitted_image *right,
@@ -74,9 +75,10 @@ bool difference_related(const struct submitted_image *s, const struct submitted_
 
 /* ln(kappa of P over kappa of Q), each against its reference: whether the noise of a program falls from P to Q as
  * that of ours does. Fails where there is no noise in one of them. */
-bool difference_noise(const struct submitted_image *p, const struct submitted_image *reference_p,
-                      const struct submitted_image *q, const struct submitted_image *reference_q,
-                      const unsigned char *use, double alpha, struct interval *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool difference_noise(const struct submitted_image *p,
+                                const struct submitted_image *reference_p,
+                                const struct submitted_image *q,
+                                const struct submitted_image *reference_q, const unsigned char *use,
+                                double alpha, struct interval *out, struct err *e);
 
 #endif

@@ -27,8 +27,8 @@ struct answer_options {
     int threads;
     double timeout_s;
 };
-bool answer_key_make(const struct rubric *r, const struct answer_options *opt,
-                     struct answer_key *out, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool answer_key_make(const struct rubric *r, const struct answer_options *opt,
+                               struct answer_key *out, struct err *e);
 void answer_key_free(struct answer_key *a);
 
 /* The set of that name; 0 where the rubric has none. */
@@ -40,9 +40,9 @@ const struct moments *answer_key_counts(const struct answer_key *a, int set, int
 
 /* One image by opt->pathtracer with spp samples a pixel and `words` besides: as its reference is made, or as_asked:
  * with the student's options too. Scenes have been staged in opt->cache/scene (submission_stage()). */
-bool answer_key_render(const struct rubric *r, int image, bool as_asked, const char *words, int spp,
-                       const struct answer_options *opt, struct moments *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool answer_key_render(const struct rubric *r, int image, bool as_asked,
+                                 const char *words, int spp, const struct answer_options *opt,
+                                 struct moments *out, struct err *e);
 
 /* Points as a share of what the check is worth: 1 where the interval comes within margin.full of 0, 0 where it stays
  * margin.none away, linear between. */
@@ -104,8 +104,8 @@ struct grading {
 };
 
 /* One check against the answers with the deviations of `set`. Fails only for our own trouble. The caller frees with result_free(). */
-bool grade_checks_run(const struct grading *g, const struct rubric_check *check, int set,
-                      struct result *out, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool grade_checks_run(const struct grading *g, const struct rubric_check *check, int set,
+                                struct result *out, struct err *e);
 
 /* The times of a check of growth, whatever its images show: CPU time of P less Q over that of R less S, two scenes with many
  * and few samples, so that reading the scene and building the hierarchy cancel. Judged at the end of the interval that is best for the program. */
@@ -115,8 +115,8 @@ void grade_checks_growth(const struct grading *g, const struct rubric_check *c, 
  * another brings 1 % of all points more and some image that is wrong without it is right with it, and not for its noise: a bug that
  * looks a little like it is not taken for it. What a program does wrong besides still costs. On failure there
  * is nothing to free. */
-bool grade_all_checks(const struct grading *g, struct result *out, int *set, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool grade_all_checks(const struct grading *g, struct result *out, int *set,
+                                struct err *e);
 void result_free(struct result *r);
 
 #endif

@@ -17,7 +17,7 @@ struct mistake {
 /* result: of all checks as graded with the deviations of *set; points that were lost for what another part pays come back. Where a bug is found on
  * top of other accepted deviations, *set becomes those. Only for programs that
  * lost points. Fails only for our own trouble. */
-bool mistake_judge(const struct grading *g, int *set, struct result *result, struct mistake *out,
-                   struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool mistake_judge(const struct grading *g, int *set, struct result *result,
+                             struct mistake *out, struct err *e);
 
 #endif

@@ -14,12 +14,11 @@ struct rate_image {
 
 /* expected: samples of each pixel in a render of ours (they hardly depend on each other: the difference of two such
  * counts varies from pixel to pixel by noise alone). Fails on what is no image of that size, and where batches are too small against `most` to tell apart. */
-bool rate_image_read(const char *path, int width, int height, int most, int batch,
-                     const double *expected, struct rate_image *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool rate_image_read(const char *path, int width, int height, int most, int batch,
+                               const double *expected, struct rate_image *out, struct err *e);
 
 /* Samples of each pixel by its colour alone, 1 at least. */
-bool rate_image_counts(const char *path, int width, int height, int most, double *count,
-                       struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool rate_image_counts(const char *path, int width, int height, int most, double *count,
+                                 struct err *e);
 
 #endif

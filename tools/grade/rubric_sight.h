@@ -18,18 +18,18 @@ bool rubric_sight_counts(const struct rubric *r, int image);
 
 /* Of a render of ours: mean, variance of the mean, n = samples in a cell. as_asked: of counting images, n as if all had been
  * taken, and FACT_SAMPLES. Fails on a size that is not of whole cells. */
-bool rubric_sight_of_render(const struct rubric *r, int image, bool as_asked,
-                            const struct moments *m, struct signature *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool rubric_sight_of_render(const struct rubric *r, int image, bool as_asked,
+                                      const struct moments *m, struct signature *out,
+                                      struct err *e);
 
 /* The variance of a student's cell that has a masked pixel: it says nothing. */
 extern const double rubric_sight_masked;
 
 /* Of a student's image, which is there. right: the reference, as_asked of counting images; correct: its cells. A program that
  * is noisier than ours (median of the cells) has that variance. */
-bool rubric_sight_of_student(const struct rubric *r, int image, const struct submitted_images *h,
-                             const struct answer *right, const struct signature *correct,
-                             struct signature *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool rubric_sight_of_student(const struct rubric *r, int image,
+                                       const struct submitted_images *h, const struct answer *right,
+                                       const struct signature *correct, struct signature *out,
+                                       struct err *e);
 
 #endif

@@ -27,19 +27,18 @@ struct stopping {
 };
 
 /* s: the student's, with its expected variance; right: the reference, m: of ours without stopping. False: no memory. */
-bool stopping_rule_range(const struct rubric_image *p, const struct submitted_image *s,
-                         const struct submitted_image *right, const struct moments *m,
-                         const unsigned char *use, struct stopping *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool stopping_rule_range(const struct rubric_image *p, const struct submitted_image *s,
+                                   const struct submitted_image *right, const struct moments *m,
+                                   const unsigned char *use, struct stopping *out, struct err *e);
 /* The rule of a program with this bug of the catalogue. */
 enum stopping_kind stopping_rule_of(const char *bug);
 
 /* How many samples s takes by each rule, if it has the light and the noise that it shows, whatever its other mistakes: the mean
  * of each tile is its own, and kappa holds its variance against ours at the right image. m as above. Fails where
  * too little of the image says something. */
-bool stopping_rule_samples(const struct rubric_image *p, const struct submitted_image *s,
-                           const struct moments *m, struct stopping out[NUM_STOPPING_KINDS],
-                           struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool stopping_rule_samples(const struct rubric_image *p, const struct submitted_image *s,
+                                     const struct moments *m,
+                                     struct stopping out[NUM_STOPPING_KINDS], struct err *e);
 void stopping_rule_free(struct stopping *s);
 
 #endif

@@ -29,9 +29,8 @@ struct submitted_image {
 
 /* curve: of integer files (tone_curve.h). Fails, with a line fit for the student, on what is no image of that size.
  * The header is looked at before anything is decoded. The caller frees with submitted_image_free(). */
-bool submitted_image_read(const char *path, const char *curve, int width, int height,
-                          struct submitted_image *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool submitted_image_read(const char *path, const char *curve, int width, int height,
+                                    struct submitted_image *out, struct err *e);
 void submitted_image_free(struct submitted_image *s);
 
 double submitted_image_luminance(const double px[3]);
@@ -39,8 +38,8 @@ double submitted_image_luminance(const double px[3]);
 /* Makes s the mean of its runs and of one more, weighted by their samples (spp of both is set), and takes that over. A run
  * of less than a third of the samples of the largest is kept, but no part of the mean: it says little, and its noise is
  * cut off at the clipping point sooner. Fails, and leaves *more to the caller, where memory is short. */
-bool submitted_image_add_run(struct submitted_image *s, struct submitted_image *more, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool submitted_image_add_run(struct submitted_image *s, struct submitted_image *more,
+                                       struct err *e);
 
 /* Are they the same values, pixel by pixel? */
 bool submitted_image_same(const struct submitted_image *a, const struct submitted_image *b);
@@ -51,13 +50,12 @@ bool submitted_image_same(const struct submitted_image *a, const struct submitte
 void submitted_image_expect(struct submitted_image *s, const struct moments *m, double spp);
 
 /* An image of the same kind as `like`: what m says, with the known variance of its mean; m NULL: black. */
-bool submitted_image_from(const struct moments *m, const struct submitted_image *like,
-                          struct submitted_image *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool submitted_image_from(const struct moments *m, const struct submitted_image *like,
+                                    struct submitted_image *out, struct err *e);
 
 /* Without the runs, but with what they measured. The caller frees it with submitted_image_free(). */
-bool submitted_image_copy(const struct submitted_image *s, struct submitted_image *out,
-                          struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool submitted_image_copy(const struct submitted_image *s, struct submitted_image *out,
+                                    struct err *e);
 
 /* `measured` of an image of one run: kappa times its expected variance, and its rounding; kappa 0: nothing is measured. */
 void submitted_image_model(struct submitted_image *s, double kappa);
@@ -71,9 +69,9 @@ void submitted_image_add(struct submitted_image *dst, const struct submitted_ima
 /* What can be compared with a render of spp samples a pixel, told by the moments of one of ours: use[p] becomes 0
  * within 5 standard errors of the clipping point (measured: those of its smallest run too, from run to run), and beside such pixels and beside clipped ones, whose variance says
  * nothing of their neighbours', and where the variance is more than 20 times the mean of the image. use: one per pixel, set by the caller to not 0. */
-bool submitted_image_comparable(const struct submitted_image *s, const struct moments *m,
-                                double spp, bool measured, unsigned char *use, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool submitted_image_comparable(const struct submitted_image *s, const struct moments *m,
+                                          double spp, bool measured, unsigned char *use,
+                                          struct err *e);
 
 /* The same without knowing better: not 0 but where s is clipped, and beside it. */
 void submitted_image_unclipped(const struct submitted_image *s, unsigned char *use);

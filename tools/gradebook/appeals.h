@@ -20,8 +20,8 @@ struct appeals {
 
 /* Fails with the line on a check that the rubric has not, on points that it does not give, without a reason, on a second line for
  * the same. The caller frees with appeals_free(). */
-bool appeals_read(const char *path, const struct rubric *r, struct appeals *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool appeals_read(const char *path, const struct rubric *r, struct appeals *out,
+                            struct err *e);
 void appeals_free(struct appeals *a);
 
 /* Hash of what is decided for a submission; a NULL: of nothing. */

@@ -13,8 +13,7 @@ struct collect {
 
 /* All images of the rubric, one after the other, so that a student's time does not depend on how many others there are; what
  * they say of the whole submission is in it then (submission_conclude()). */
-bool collect_images(const struct collect *c, struct submitted_images *h, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool collect_images(const struct collect *c, struct submitted_images *h, struct err *e);
 
 /* grade_all_checks(), and again after every purchase: as long as a check is undecided for its noise and the rubric's budget
  * of CPU seconds lasts, the image that is cheapest to mend is rendered once more. The assignment's programs have no option
@@ -23,7 +22,7 @@ bool collect_images(const struct collect *c, struct submitted_images *h, struct 
  * falls into other pixels after the first few. It is tested (difference_correlated()): of runs that go together only the larger
  * counts, and none twice. Noise that does not fall with the samples is none that samples can mend: that image's `fixed` is
  * set, and width costs points. What is undecided in the end keeps its points (result.more). */
-bool collect_until_decided(const struct collect *c, struct submitted_images *h, struct result *out,
-                           int *set, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool collect_until_decided(const struct collect *c, struct submitted_images *h,
+                                     struct result *out, int *set, struct err *e);
 
 #endif

@@ -31,13 +31,12 @@ struct grade_job {
 /* Grades all, `jobs` at a time. A submission that cannot be graded for our trouble has "trouble"; the others go
  * on. Fails only where nothing can be written. Two submissions of the same id are an error. *grades: a new array, in
  * the order of path. */
-bool grade_batch_run(const struct grade_job *job, json_t **grades, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool grade_batch_run(const struct grade_job *job, json_t **grades, struct err *e);
 
 /* What is made of the grades, without the submissions: of the class, OUT/grades.json, the array, grades.csv, junit.xml, grades.tap
  * and index.html, the page for staff; of each submission, OUT/ID/results.json as Gradescope reads it, index.html, and staff.html with
  * the references (r, a: NULL, none). The pages need no other file to be read. */
-bool grade_write(const char *out, const struct rubric *r, const struct answer_key *a,
-                 const json_t *grades, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool grade_write(const char *out, const struct rubric *r, const struct answer_key *a,
+                           const json_t *grades, struct err *e);
 
 #endif

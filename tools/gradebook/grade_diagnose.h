@@ -15,9 +15,9 @@ struct grade_diagnosis {
 };
 
 /* r has a `diagnose` command. stage: a directory to be made below the sandbox's. The suite has to outlive it. */
-bool grade_diagnose_open(const struct rubric *r, const char *catalogue_dir,
-                         const struct suite *suite, const char *stage, struct grade_diagnosis *out,
-                         struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool grade_diagnose_open(const struct rubric *r, const char *catalogue_dir,
+                                   const struct suite *suite, const char *stage,
+                                   struct grade_diagnosis *out, struct err *e);
 void grade_diagnose_close(struct grade_diagnosis *d);
 
 /* By the images that were graded, in the form of tools/docs/formats/grades.md ("diagnosis"). "with": name of the deviations on

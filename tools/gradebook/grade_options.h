@@ -19,12 +19,11 @@ struct grade_settings {
 /* at: gets the paths that the options do not give. submission: NULL out of memory, else room for argc + 1, which the caller frees. */
 struct grade_settings grade_options_default(int argc, struct data_dirs *at);
 /* On top of the defaults. */
-bool grade_options_parse(int argc, char **argv, struct grade_settings *s, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool grade_options_parse(int argc, char **argv, struct grade_settings *s, struct err *e);
 /* The words that decide a grade: "grade", the options and the rubric, without the submissions, where outputs go, how many at a
  * time and the variant, which the references know: a NULL-terminated array of num words, to free(). NULL out of memory. */
-char **grade_options_words(int argc, char **argv, const struct grade_settings *s, int *num)
-    __attribute__((warn_unused_result));
+NODISCARD char **grade_options_words(int argc, char **argv, const struct grade_settings *s,
+                                     int *num);
 void grade_options_help(void);
 
 /* Where references are kept. */

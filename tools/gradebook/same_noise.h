@@ -26,8 +26,8 @@ struct noise_print {
 /* Of an image of spp samples, whose reference is m. A block is used where no pixel is near the clipping point (submitted_image.h) and
  * noise like that of our render is a code wide: finer noise is rounded alike by everybody. Where the image has less
  * than a quarter of the noise of ours, no block is. False: out of memory. The caller frees. */
-bool same_noise_of(const struct submitted_image *s, const struct moments *m, double spp,
-                   struct noise_print *out, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool same_noise_of(const struct submitted_image *s, const struct moments *m, double spp,
+                             struct noise_print *out, struct err *e);
 void same_noise_free(struct noise_print *n);
 
 /* T of "the reference m is in this image", with whatever noise added. twin: a render like m of another seed. In the same
@@ -48,7 +48,7 @@ double same_noise_bound(double tests, double alpha);
  * "bound": }], also without "picture" for all its images together (T over the root of their number, which the same bound
  * holds for); ALPHA is for each of the two. */
 #define SAME_NOISE_ALPHA 1e-3
-bool same_noise(const char *out, const struct rubric *r, const struct answer_key *a, json_t *grades,
-                struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool same_noise(const char *out, const struct rubric *r, const struct answer_key *a,
+                          json_t *grades, struct err *e);
 
 #endif

@@ -9,12 +9,11 @@
 
 /* Of one grade.json (grade_batch.h), whose images are in dir/ID: what was lost first. For the student: only checks that are visible
  * now, no references, nothing that is staff's. */
-bool student_page(FILE *f, const char *dir, const json_t *grade, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool student_page(FILE *f, const char *dir, const json_t *grade, struct err *e);
 
 /* The same for staff: everything, beside the references if rubric and answers are given (NULL: they are not). */
-bool staff_page(FILE *f, const char *dir, const struct rubric *r, const struct answer_key *a,
-                const json_t *grade, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool staff_page(FILE *f, const char *dir, const struct rubric *r,
+                          const struct answer_key *a, const json_t *grade, struct err *e);
 
 /* What a page says first. May a check be seen now? Staff see all. */
 bool grade_summary_shows(const json_t *check, bool staff);
@@ -36,6 +35,6 @@ void grade_plot_difference(FILE *f, const json_t *check, double width, double he
 void grade_plot_intervals(FILE *f, const json_t *check);
 
 /* Of the whole class, for staff: what needs them first. Fails only out of memory. */
-bool class_page(FILE *f, const json_t *grades, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool class_page(FILE *f, const json_t *grades, struct err *e);
 
 #endif

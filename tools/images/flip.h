@@ -16,8 +16,8 @@
 
 /* LDR-FLIP of `test` against `reference`, values in [0, 1] (clamped), into map. Symmetric. Fails only out of
  * memory. */
-bool flip_ldr(const double *reference, const double *test, int width, int height, double ppd,
-              float *map, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool flip_ldr(const double *reference, const double *test, int width, int height,
+                        double ppd, float *map, struct err *e);
 
 /* Stops at which HDR-FLIP looks: num of them, evenly from start to stop. */
 struct flip_exposures {
@@ -28,14 +28,14 @@ struct flip_exposures {
 /* From the brightest pixel's luminance and the median one at 0.85 after the tone curve [Andersson21, 4.1]; a stop
  * apart or a little less, at least 2. False if the reference is black. Beyond the paper, which has no median there:
  * where more than half of the pixels are black, the median of the others. */
-bool flip_exposures(const double *reference, size_t pixels, struct flip_exposures *out,
-                    struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool flip_exposures(const double *reference, size_t pixels, struct flip_exposures *out,
+                              struct err *e);
 
 /* HDR-FLIP: the largest LDR-FLIP of each pixel over those exposures. Negative radiance counts as 0. Not symmetric,
  * as the exposures are those of the reference. */
-bool flip_hdr(const double *reference, const double *test, int width, int height, double ppd,
-              const struct flip_exposures *exposures, float *map, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool flip_hdr(const double *reference, const double *test, int width, int height,
+                        double ppd, const struct flip_exposures *exposures, float *map,
+                        struct err *e);
 
 double flip_mean(const float *map, size_t pixels);
 

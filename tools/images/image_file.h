@@ -16,16 +16,14 @@ struct image_file {
  * where it is 1 everywhere. An EXR whose data and display windows differ is the image shown (image_uncrop()).
  * Fails on other formats and channels, on a rotated or otherwise cropped image, on
  * several images in one file, on NaN and infinity. The caller frees with image_file_free(). */
-bool image_file_read(const char *path, struct image_file *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool image_file_read(const char *path, struct image_file *out, struct err *e);
 /* The same of a file that image_inspect() has looked at, so that it is opened once less. */
-bool image_file_read_inspected(const char *path, const struct image_info *info,
-                               struct image_file *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool image_file_read_inspected(const char *path, const struct image_info *info,
+                                         struct image_file *out, struct err *e);
 /* The same from an image that is already read, and uncropped. */
-bool image_file_from_image(const char *path, const struct image *im, const struct image_info *info,
-                           struct image_file *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool image_file_from_image(const char *path, const struct image *im,
+                                     const struct image_info *info, struct image_file *out,
+                                     struct err *e);
 void image_file_free(struct image_file *p);
 
 #endif

@@ -31,13 +31,13 @@
 
 /* Packs m, to 2^coarser/16 of the standard errors (0: 1/16). *bytes belongs to the caller (free()). *uniform_n: all pixels have the n of the first. Fails
  * only out of memory. */
-bool pixel_codec_encode(const struct moments *m, int coarser, uint8_t **bytes, size_t *size,
-                        bool *uniform_n, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool pixel_codec_encode(const struct moments *m, int coarser, uint8_t **bytes,
+                                  size_t *size, bool *uniform_n, struct err *e);
 
 /* Packs a map of numbers in [0, 1], NaN being 0, as round(128 sqrt(v)): steps of 0.0005 at 0.001, of 0.016 at 1. A zlib
  * stream of a byte a pixel, row 0 at the top, each less its left neighbour (0 in column 0), mod 256. *bytes belongs to the
  * caller (free()). Fails only out of memory. */
-bool pixel_codec_encode_map(const float *map, int width, int height, uint8_t **bytes, size_t *size,
-                            struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool pixel_codec_encode_map(const float *map, int width, int height, uint8_t **bytes,
+                                      size_t *size, struct err *e);
 
 #endif

@@ -13,12 +13,11 @@ struct replicate_dir {
 /* Reads every file of the directory (but hidden ones) in the order of their names. Fails with a line
  * unless all are images of 32-bit floats (image_file.h) of one size, at least 3, no two of them the
  * same ("the seed was ignored"). The caller frees with replicate_dir_free(). */
-bool replicate_dir_read(const char *dir, struct replicate_dir *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool replicate_dir_read(const char *dir, struct replicate_dir *out, struct err *e);
 void replicate_dir_free(struct replicate_dir *r);
 
 /* Their moments, unit "replicate", spp 0 (not known). */
-bool replicate_dir_moments(const struct replicate_dir *r, struct moments *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool replicate_dir_moments(const struct replicate_dir *r, struct moments *out,
+                                     struct err *e);
 
 #endif

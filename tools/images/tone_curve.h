@@ -11,8 +11,7 @@ struct curve {
 
 /* "linear", "srgb" (IEC 61966-2-1), "gamma=2.2" (in [0.2, 5]) or "cgl" (the assignment's: (sqrt(2)
  * L)^(1/2.2), cut off to the step below). The others are taken to be rounded to the nearest step. */
-bool tone_curve_parse(const char *text, struct curve *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool tone_curve_parse(const char *text, struct curve *out, struct err *e);
 
 /* Radiance of a code of 0 .. 1. Rises strictly. */
 double tone_curve_decode(const struct curve *c, double code);

@@ -52,19 +52,18 @@ struct input_memory {
 };
 
 /* Reads one side; `side` is 'a' or 'b', for messages. The caller frees with input_free(). */
-bool input_read(const char *path, char side, const struct input_options *opt, struct input *out,
-                struct notes *notes, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool input_read(const char *path, char side, const struct input_options *opt,
+                          struct input *out, struct notes *notes, struct err *e);
 /* The same of one in memory; `name` is for messages and notes. */
-bool input_take(const struct input_memory *memory, const char *name, char side,
-                const struct input_options *opt, struct input *out, struct notes *notes,
-                struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool input_take(const struct input_memory *memory, const char *name, char side,
+                          const struct input_options *opt, struct input *out, struct notes *notes,
+                          struct err *e);
 void input_free(struct input *in);
 
 /* Makes both fit for compare_moments(), packed or not: the same colour space, censored pixels out of both (0, exact,
  * whatever they were), skewness bounded where it is not known, and variance from the images
  * themselves if one of them has none. */
-bool input_pair(struct input *a, struct input *b, struct notes *notes, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool input_pair(struct input *a, struct input *b, struct notes *notes, struct err *e);
 
 /* After compare_moments() on a pair: EQUIVALENT and NO DIFFERENCE FOUND become INCONCLUSIVE, with the reason, if more than
  * 5 % of the image or half of a reporting tile is censored; in the latter case nothing is detectable

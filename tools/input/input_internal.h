@@ -10,20 +10,18 @@ void input_note_crop(struct notes *notes, const char *path, const struct image_i
 
 /* Mitsuba 3 (input_mitsuba.c). *is_it: whether the file is such a one at all; false and no error if
  * not. `im` is the file. */
-bool input_mitsuba(const char *path, char side, const struct image *im,
-                   const struct image_info *info, const struct input_options *opt,
-                   struct input *out, bool *is_it, struct notes *notes, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool input_mitsuba(const char *path, char side, const struct image *im,
+                             const struct image_info *info, const struct input_options *opt,
+                             struct input *out, bool *is_it, struct notes *notes, struct err *e);
 /* R, G, B to X, Y, Z: means, and bounds of the rest for any correlation of the channels. */
 void input_to_xyz(struct input *in);
 
 /* Images without moments (plain_image.c). */
-bool plain_image_input(const char *path, char side, const struct input_options *opt,
-                       struct input *out, struct notes *notes, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool plain_image_input(const char *path, char side, const struct input_options *opt,
+                                 struct input *out, struct notes *notes, struct err *e);
 /* The same of one that is read; `path` is for messages. */
-bool plain_image_take(const char *path, char side, const struct image_file *pic,
-                      const struct input_options *opt, struct input *out, struct notes *notes,
-                      struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool plain_image_take(const char *path, char side, const struct image_file *pic,
+                                const struct input_options *opt, struct input *out,
+                                struct notes *notes, struct err *e);
 
 #endif

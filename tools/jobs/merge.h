@@ -30,8 +30,7 @@ struct share {
 };
 
 /* Reads one. Fails with a line on a file that is no image of pathtracer or lacks the metadata. */
-bool share_read(const char *path, struct share *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool share_read(const char *path, struct share *out, struct err *e);
 void share_free(struct share *s);
 
 /* The union of num >= 1 shares, as the moments of all their samples [Pebay08] and with the layers of
@@ -42,11 +41,10 @@ void share_free(struct share *s);
  * they share samples, if cells overlap without being the same, if cells have different samples, if
  * the cells do not fill a rectangle, if sample ranges stopped each by the assignment's adaptive
  * rule, or if the ranges to keep are more than 162. */
-bool merge_shares(struct share *share, int num, struct share *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool merge_shares(struct share *share, int num, struct share *out, struct err *e);
 
 /* Writes it as pathtracer would, with `command` as its origin. */
-bool share_write(const char *path, const struct share *s, const char *command, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool share_write(const char *path, const struct share *s, const char *command,
+                           struct err *e);
 
 #endif

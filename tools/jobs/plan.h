@@ -32,27 +32,25 @@ struct plan_wishes {
 
 /* Plans the command argv[0 .. argc-1], whose first word is one of the kinds, and
  * writes DIR/plan.jsonl by rename. dir NULL: OUTPUT.plan beside the output of the command. */
-bool plan_make(const char *dir, int argc, char **argv, const struct plan_wishes *w,
-               struct plan *out, struct err *e) __attribute__((warn_unused_result));
-bool plan_read(const char *dir, struct plan *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool plan_make(const char *dir, int argc, char **argv, const struct plan_wishes *w,
+                         struct plan *out, struct err *e);
+NODISCARD bool plan_read(const char *dir, struct plan *out, struct err *e);
 void plan_free(struct plan *p);
 
 /* Is the artefact of job k there? Whether it is what was written, job_run_verify() says. */
 bool job_run_is_made(const struct plan *p, int k);
-bool job_run_verify(const struct plan *p, int k, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool job_run_verify(const struct plan *p, int k, struct err *e);
 
 /* Makes it, if it is not there with the right hash: *made. Fails if an input is not the one that was planned with or the
  * program fails; then there is no artefact. Current directory: the plan's cwd. */
-bool job_run(const struct plan *p, int k, bool *made, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool job_run(const struct plan *p, int k, bool *made, struct err *e);
 
 /* Puts the artefacts together to what the command would have left, and returns its exit code. Fails with EXIT_NOT_JUDGED on
  * a job that is not made. Current directory: the plan's cwd. */
 int plan_gather(const struct plan *p, struct err *e);
 
 /* Goes to the plan's cwd. */
-bool plan_enter(const struct plan *p, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool plan_enter(const struct plan *p, struct err *e);
 
 /* DIR/jobs/KEY of job k[/name]. */
 struct path job_run_artefact(const struct plan *p, int k, const char *name);

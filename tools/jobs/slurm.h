@@ -10,6 +10,6 @@
  * it printed (PLAN: hash of plan.jsonl). One line of progress on stderr where anything changes.
  * Fails with a line if Slurm cannot be asked for a minute, or on a job that came back three times without its artefact. On SIGINT and
  * SIGTERM the arrays are cancelled. */
-bool slurm_make(const struct plan *p, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool slurm_make(const struct plan *p, struct err *e);
 
 #endif

@@ -14,8 +14,8 @@ struct library_side {
 
 /* Checks what compare_moments() does not: that sizes and counts make sense and numbers of images are finite. Copies, as three
  * channels. `name`: where the side has none. Fails with a line that begins with the name. The caller closes, also after a failure. */
-bool library_side_open(struct library_side *out, const struct assay_side *side, const char *name,
-                       struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool library_side_open(struct library_side *out, const struct assay_side *side,
+                                 const char *name, struct err *e);
 void library_side_close(struct library_side *s);
 
 /* Returns ok, with the line of a failure for the caller, who may not want it (NULL), else an empty one. */

@@ -13,7 +13,7 @@ void plot_qq_band(int i, int n, double *low, double *high);
 
 /* <figure> of the tiles' p-values against those that uniform ones would have, with its band; nothing for
  * fewer than 4 tiles with noise. Fails only out of memory. */
-bool plot_qq(FILE *f, const json_t *claim, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool plot_qq(FILE *f, const json_t *claim, struct err *e);
 
 /* The chance that a bias of the image's mean (relative) comes out DIFFERENT, by the statistic of the image
  * alone: Phi((bias - margin)/SE - c), c the normal quantile at the level of its tests, SE from the MDB, which

@@ -9,6 +9,6 @@
 
 /* <section> with a bar for each scene of which a claim has "rays_a" (results.h), most tests first: box and primitive tests
  * of a ray, of the first such claim. Nothing where none has. Fails only out of memory. */
-bool plot_rays(FILE *f, const json_t *claims, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool plot_rays(FILE *f, const json_t *claims, struct err *e);
 
 #endif

@@ -5,12 +5,11 @@
 #include "renderer/base/err.h"
 
 /* Reads results_path and the files it names, writes out_path (by rename, with its directories). */
-bool report_write(const char *results_path, const char *out_path, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool report_write(const char *results_path, const char *out_path, struct err *e);
 
 /* The same with the "convergence" of another results.json (NULL: none), after the scenes. Fails if both
  * files have some. */
-bool report_write_with(const char *results_path, const char *converge_path, const char *out_path,
-                       struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool report_write_with(const char *results_path, const char *converge_path,
+                                 const char *out_path, struct err *e);
 
 #endif

@@ -58,16 +58,16 @@ struct page {
 };
 
 /* The number on the page of the layer of m, which was read from path; the same path has one. */
-bool report_pixel_data_add(struct page *p, const char *path, const struct moments *m, size_t *index,
-                           struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool report_pixel_data_add(struct page *p, const char *path, const struct moments *m,
+                                     size_t *index, struct err *e);
 /* All layers, then the FLIP maps, and the colours of maps, as base64 in elements that no browser runs. */
 void report_pixel_data_write(struct page *p);
 void report_pixel_data_free(struct page *p);
 
 /* <section> of one scene: what it is for, its images, each of its claims. All claims are of the
  * same scene. Fails when an image cannot be read or the sizes differ. */
-bool report_scene(struct page *p, const struct claim_ref *claim, size_t num, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool report_scene(struct page *p, const struct claim_ref *claim, size_t num,
+                            struct err *e);
 
 /* One side of a claim, as loaded. */
 struct claim_side {
@@ -77,9 +77,9 @@ struct claim_side {
 
 /* <article> of one judged claim: where the page's script puts its maps, the histogram, and all that is
  * needed to doubt the verdict. `white` is the radiance shown as white. */
-bool report_claim(struct page *p, const struct claim_ref *claim, const struct claim_side *a,
-                  const struct claim_side *b, double white, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool report_claim(struct page *p, const struct claim_ref *claim,
+                            const struct claim_side *a, const struct claim_side *b, double white,
+                            struct err *e);
 
 /* <article> of a claim that could not be judged. */
 void report_claim_error(struct page *p, const struct claim_ref *claim);
@@ -113,14 +113,14 @@ void report_evidence_tiles(FILE *f, const json_t *claim);
 
 /* Compares A with the reference B, radiance `white` being shown as white. map (a float a pixel) receives HDR-FLIP.
  * Fails only out of memory. */
-bool report_similarity_measure(const struct moments *a, const struct moments *b, double white,
-                               struct similarity *out, float *map, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool report_similarity_measure(const struct moments *a, const struct moments *b,
+                                         double white, struct similarity *out, float *map,
+                                         struct err *e);
 /* The claim's line, and its place in the table; the map goes into the page as the claim's, for its script, but
  * for a claim as expected on a page of many. */
-bool report_similarity(struct page *p, const struct claim_ref *claim, const struct moments *a,
-                       const struct moments *b, double white, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool report_similarity(struct page *p, const struct claim_ref *claim,
+                                 const struct moments *a, const struct moments *b, double white,
+                                 struct err *e);
 /* <section> with the table of all claims that have such a line; nothing without any. */
 void report_similarity_table(const struct page *p);
 

@@ -26,7 +26,7 @@ void reproduced_free(struct reproduced *r);
 
 /* False if it cannot be judged: no provenance, a scene, camera or environment file that is not the one of then, a program that fails
  * or is not ours. That values differ is no failure but num_different > 0. */
-bool reproduce(const char *path, const struct reproduce_options *opt, struct reproduced *out,
-               struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool reproduce(const char *path, const struct reproduce_options *opt,
+                         struct reproduced *out, struct err *e);
 
 #endif

@@ -30,7 +30,6 @@ bool claim_result_add_observations(json_t *claim, const char *side, const struct
 
 /* A new results object with everything but claims: command line (a verb and its arguments, NULL at argv[argc]; in words that
  * shell_quote_split() reads back), date, machine. NULL with a line if an argument is no UTF-8, and out of memory. */
-json_t *claim_result_new_results(int argc, char **argv, double alpha, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD json_t *claim_result_new_results(int argc, char **argv, double alpha, struct err *e);
 
 #endif

@@ -12,12 +12,12 @@
 
 /* Checks all that the functions below and the report rely on; a failure is a line with file, scene,
  * engine and member. */
-bool convergence_results_check(const json_t *convergence, const char *path, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool convergence_results_check(const json_t *convergence, const char *path,
+                                         struct err *e);
 
 /* Checks "depths" of a scene, or {"error": "one line"} of a ladder that could not be rendered; the line begins with `where`. */
-bool convergence_results_check_depths(const json_t *depths, const char *where, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool convergence_results_check_depths(const json_t *depths, const char *where,
+                                                struct err *e);
 
 /* How an engine came out; MEASURED is as expected. */
 enum outcome convergence_results_outcome(const json_t *engine);

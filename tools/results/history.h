@@ -48,15 +48,13 @@ struct history {
 
 /* Reads every file named results.json below dir (8 levels, no links). Fails with a line on one that cannot
  * be read, if there is none, and on more than 400. The caller frees with history_free(). */
-bool history_read(const char *dir, double alpha, struct history *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool history_read(const char *dir, double alpha, struct history *out, struct err *e);
 void history_free(struct history *h);
 
 /* "d36ec014cebb" of "0.1 (commit d36ec014cebb)", else all of the version. */
 void history_commit(const struct history_run *run, char *out, size_t size);
 
 /* The page: a row for each series, with plots against the runs. By rename. */
-bool report_history(const struct history *h, const char *path, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool report_history(const struct history *h, const char *path, struct err *e);
 
 #endif

@@ -9,8 +9,7 @@
 #include <stdio.h>
 
 /* Checks all that the functions below rely on; a failure is a line with file, scene, engine and member. */
-bool noise_results_check(const json_t *noise, const char *path, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool noise_results_check(const json_t *noise, const char *path, struct err *e);
 
 enum outcome noise_results_outcome(const json_t *row);
 

@@ -21,8 +21,7 @@ enum { EXIT_EQUIVALENT = 0, EXIT_DIFFERENT = 1, EXIT_INCONCLUSIVE = 2, EXIT_NOT_
 
 /* Reads results.json and checks all that report and junit rely on (see above), each failure a line
  * with file, claim and member. New reference in *out. */
-bool results_read(const char *path, json_t **out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool results_read(const char *path, json_t **out, struct err *e);
 
 /* How a claim came out, worst first. OPPOSITE: DIFFERENT for what should pass, or EQUIVALENT for DIFFERENT. UNDECIDED: any
  * other verdict that was not expected. */
@@ -66,7 +65,6 @@ int results_exit_code(const json_t *results);
 
 /* JUnit XML: one testsuite, one testcase per claim; failure for a wrong verdict, error for one that
  * could not be judged. Appears by rename. */
-bool junit_write(const char *path, const json_t *results, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool junit_write(const char *path, const json_t *results, struct err *e);
 
 #endif

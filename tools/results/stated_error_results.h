@@ -8,8 +8,7 @@
 #include <stdio.h>
 
 /* Checks all that the functions below rely on; a failure is a line with file, scene and member. */
-bool stated_error_check(const json_t *consistency, const char *path, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool stated_error_check(const json_t *consistency, const char *path, struct err *e);
 
 enum outcome stated_error_outcome(const json_t *claim);
 

@@ -44,9 +44,8 @@ typedef bool (*alpha_spending_pair)(void *ctx, int stage, const struct moments *
 /* One look. opt->alpha is that of the whole claim; share[look] > 0; stages 1 or 2. *stage tells which
  * pair out is of. DIFFERENT and EQUIVALENT are final, the others are not. Fails as compare_moments()
  * and pair() do, and if the fresh pair is the first pair again. */
-bool alpha_spending_judge(const struct alpha_spending *q, int look, int stages,
-                          const struct compare_options *opt, alpha_spending_pair pair, void *ctx,
-                          struct comparison *out, int *stage, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool alpha_spending_judge(const struct alpha_spending *q, int look, int stages,
+                                    const struct compare_options *opt, alpha_spending_pair pair,
+                                    void *ctx, struct comparison *out, int *stage, struct err *e);
 
 #endif

@@ -24,23 +24,22 @@ double two_stage_alpha(double alpha);
  * alpha/2, and its verdict is final; else it is the one at sqrt(alpha),
  * and DIFFERENT. Its mdb is then no bound of what two stages miss; that of the unflagged one is
  * (for alpha up to 1e-2), as alpha/2 is stricter than two stages. Fails as compare_moments() does. */
-bool two_stage_first(const struct moments *a, const struct moments *b,
-                     const struct compare_options *opt, struct comparison *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool two_stage_first(const struct moments *a, const struct moments *b,
+                               const struct compare_options *opt, struct comparison *out,
+                               struct err *e);
 
 /* Stage 2, for a `first` that is DIFFERENT by two_stage_first() (same opt). Both a2 and b2 must have been
  * observed afresh, unless exact: a stored reference used in both stages puts its own noise into
  * both. second: the comparison of the second pair at alpha/2 with the claim's verdict: DIFFERENT if
  * confirmed; else what the second pair says by itself, where DIFFERENT (at another place, which
  * needs another fresh pair) becomes INCONCLUSIVE. Its reason tells of both stages. */
-bool two_stage_confirm(const struct comparison *first, const struct moments *a2,
-                       const struct moments *b2, const struct compare_options *opt,
-                       struct comparison *second, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool two_stage_confirm(const struct comparison *first, const struct moments *a2,
+                                 const struct moments *b2, const struct compare_options *opt,
+                                 struct comparison *second, struct err *e);
 
 /* Fails with a line if the second observation of a side has the very numbers of the first (the seed
  * was ignored, or the file is the same), other than exact ones, or another size or unit. */
-bool two_stage_check_fresh(const struct moments *first, const struct moments *again, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool two_stage_check_fresh(const struct moments *first, const struct moments *again,
+                                     struct err *e);
 
 #endif

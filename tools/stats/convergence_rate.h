@@ -30,8 +30,8 @@ struct converge_reference {
 /* The reference for images `shrink` times smaller on both sides: box averages, which with a box
  * filter of one pixel are the smaller image exactly. Fails where shrink does not divide the size,
  * on stratified moments, on fewer than two observations, and on a black image. */
-bool convergence_rate_reference_init(struct converge_reference *r, const struct moments *m,
-                                     int shrink, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool convergence_rate_reference_init(struct converge_reference *r,
+                                               const struct moments *m, int shrink, struct err *e);
 void convergence_rate_reference_free(struct converge_reference *r);
 
 /* An estimate with its standard error and the degrees of freedom of that. */
@@ -57,9 +57,9 @@ struct rung {
 /* Judges `count` >= 3 replicates, one after the other in `images`. Fails where two replicates are the
  * same (the seed has no effect), where there is no noise at all, and where the reference is so noisy
  * that MSE is not positive. */
-bool convergence_rate_rung(const float *images, int count, double spp,
-                           const struct converge_reference *ref, struct rung *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool convergence_rate_rung(const float *images, int count, double spp,
+                                     const struct converge_reference *ref, struct rung *out,
+                                     struct err *e);
 
 /* Slope of ln RMSE on ln spp over num >= 2 rungs with replicates of their own. Weighted least squares:
  * the weights are 1/(own + mean squared standard error), so that a rung whose few replicates happen to

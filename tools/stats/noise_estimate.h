@@ -36,9 +36,8 @@ struct noise_estimate {
  * the skewness above; n is no count of anything. `more` (3 per pixel and side, or NULL) is variance
  * that the side has besides. Pixels with censored[p] != 0 take no part and get no noise. Fails with a
  * line where the images are the same, smaller than 32 x 32, or too much is censored. */
-bool noise_estimate_variance(struct moments *a, struct moments *b, const double *more_a,
-                             const double *more_b, const unsigned char *censored,
-                             struct noise_estimate *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool noise_estimate_variance(struct moments *a, struct moments *b, const double *more_a,
+                                       const double *more_b, const unsigned char *censored,
+                                       struct noise_estimate *out, struct err *e);
 
 #endif

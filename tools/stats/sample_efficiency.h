@@ -22,8 +22,8 @@ struct sample_efficiency {
  * pixel. The interval of ln ratio is Student's, from the spread between renders. DIFFERENT if it
  * lies outside [1/(1 + margin), 1 + margin], EQUIVALENT if inside, else INCONCLUSIVE. alpha as of
  * stated_error_judge(). Fails where a pixel has less than two samples, and where nothing has noise. */
-bool sample_efficiency_judge(const struct moments *render, int num, int spp, const double *variance,
-                             double margin, double alpha, struct sample_efficiency *out,
-                             struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool sample_efficiency_judge(const struct moments *render, int num, int spp,
+                                       const double *variance, double margin, double alpha,
+                                       struct sample_efficiency *out, struct err *e);
 
 #endif

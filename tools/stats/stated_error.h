@@ -36,8 +36,7 @@ struct stated_error {
  * else INCONCLUSIVE. alpha: the chance that independent samples come out DIFFERENT, and that an R
  * outside the margin comes out EQUIVALENT. Fails if sizes or n differ, if n < 2, or if there is no
  * noise in any render. */
-bool stated_error_judge(const struct moments *render, int num, double margin, double alpha,
-                        struct stated_error *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool stated_error_judge(const struct moments *render, int num, double margin,
+                                  double alpha, struct stated_error *out, struct err *e);
 
 #endif

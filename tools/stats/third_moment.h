@@ -18,7 +18,7 @@
 /* Sets M3 of the sides that lack it (at least one) from n >= 3, mean and M2 of both, so that k3A - k3B is the bound, and
  * that k3A^2/vA + k3B^2/vB, by which compare.c tells degrees of freedom, is R V^2 if both lack it. An exact side has no
  * variance, and keeps M3 = 0. Fails only out of memory. */
-bool third_moment_bound(struct moments *a, struct moments *b, bool lacks_a, bool lacks_b,
-                        struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool third_moment_bound(struct moments *a, struct moments *b, bool lacks_a, bool lacks_b,
+                                  struct err *e);
 
 #endif

@@ -30,14 +30,13 @@ int variance_map_tile(const struct variance_map *m, int x, int y, int side);
 
 /* K images one after the other, rows of `width` pixels (of unit->size / 3). Fails where two are the same bit by bit
  * and yet not all are: a seed without effect. */
-bool variance_ladder_between(const float *images, int count, const struct converge_reference *unit,
-                             int width, int tile, struct variance_map *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool variance_ladder_between(const float *images, int count,
+                                       const struct converge_reference *unit, int width, int tile,
+                                       struct variance_map *out, struct err *e);
 /* K renders of unit "sample"; fails where a pixel holds fewer than two, or an M3 that no samples of 0 and more can have. */
-bool variance_ladder_within(const struct moments *render, int count,
-                            const struct converge_reference *unit, int tile,
-                            struct variance_map *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool variance_ladder_within(const struct moments *render, int count,
+                                      const struct converge_reference *unit, int tile,
+                                      struct variance_map *out, struct err *e);
 
 /* ln of an estimate of V > 0, by the delta rule. */
 struct estimate variance_ladder_log(struct estimate v);

@@ -120,8 +120,8 @@ struct rubric_mistakes {
 /* Reads the file and looks for mistakes, all of them; *m is sorted by line. Scenes named are looked up in the
  * suite, which has to outlive the rubric. variant: what "{variant}" stands for where the rubric has variants; 0: the first. Fails only if the file cannot be read or is longer than 1 MiB; a
  * rubric with mistakes is not to be used. *out is large: not for the stack. */
-bool rubric_read(const char *path, const struct suite *suite, int variant, struct rubric *out,
-                 struct rubric_mistakes *m, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool rubric_read(const char *path, const struct suite *suite, int variant,
+                           struct rubric *out, struct rubric_mistakes *m, struct err *e);
 
 /* The number after an option of an image, or the k-th further one: `-a BATCH TOLERANCE`; 0: it has none. */
 double rubric_option(const struct rubric_image *p, const char *option, int k);

@@ -7,12 +7,11 @@
 
 /* From 1 to r->variants; 0 where it has none. references: a directory, made if need be, whose file "variant" says which; where there
  * is none it is written: `asked`, or a random one if that is 0. Fails if another one was drawn than is asked for, or than there is. */
-bool rubric_variant_draw(const char *references, const struct rubric *r, int asked, int *variant,
-                         struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool rubric_variant_draw(const char *references, const struct rubric *r, int asked,
+                                   int *variant, struct err *e);
 
 /* Reads it again as that variant, where the rubric has any. */
-bool rubric_variant_read(const char *references, const struct suite *suite, int asked,
-                         struct rubric *r, struct rubric_mistakes *m, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool rubric_variant_read(const char *references, const struct suite *suite, int asked,
+                                   struct rubric *r, struct rubric_mistakes *m, struct err *e);
 
 #endif

@@ -49,34 +49,33 @@ struct made {
 
 /* Directory of what all runs need, made once: scenes and environments of the rubric's images, by their last
  * names, which have to differ. */
-bool submission_stage(const struct rubric *r, const char *dir, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool submission_stage(const struct rubric *r, const char *dir, struct err *e);
 
 /* Looks what it is and packs it. work: a directory of its own below the sandbox's. What is wrong with the
  * submission is in out->why; false only if we cannot go on. */
-bool submission_open(const struct rubric *r, const char *path, const char *work,
-                     struct submission *out, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool submission_open(const struct rubric *r, const char *path, const char *work,
+                               struct submission *out, struct err *e);
 
 /* The last part of a path without the ending of an archive; "" if that is no name. */
 void submission_id(const char *path, char id[128]);
 
 /* A run of it, or what it was before, if that is kept (kept_run.h). inputs: the files in job->scene that it reads. */
-bool submission_run(const struct rubric *r, const struct sandbox *box, const struct submission *s,
-                    const struct sandbox_job *job, const char *const *inputs,
-                    struct sandbox_result *out, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool submission_run(const struct rubric *r, const struct sandbox *box,
+                              const struct submission *s, const struct sandbox_job *job,
+                              const char *const *inputs, struct sandbox_result *out, struct err *e);
 
 /* Unpacks it, builds it in the sandbox, if it is to be built, and looks whether the program would start. The build's output goes to
  * `log`. cache: of ccache (sandbox.h), or NULL; `fill`: it is staff who fill it. */
-bool submission_build(const struct rubric *r, const struct sandbox *box, const char *cache,
-                      bool fill, const char *work, const char *log, struct submission *s,
-                      struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool submission_build(const struct rubric *r, const struct sandbox *box,
+                                const char *cache, bool fill, const char *work, const char *log,
+                                struct submission *s, struct err *e);
 
 /* One image of the rubric, or one like it with another name and other samples: found, or made in the sandbox and
  * then moved to out_dir, where its log goes too. An image that is not there is no error: made->why says so. */
-bool submission_image(const struct rubric *r, const struct sandbox *s, const struct submission *sub,
-                      const struct rubric_image *p, const char *stage, const char *work,
-                      const char *out_dir, uint64_t seed, int threads, struct made *made,
-                      struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool submission_image(const struct rubric *r, const struct sandbox *s,
+                                const struct submission *sub, const struct rubric_image *p,
+                                const char *stage, const char *work, const char *out_dir,
+                                uint64_t seed, int threads, struct made *made, struct err *e);
 
 /* Is it in vain to run the program for that image, as it has not ended on the same scene with hardly more samples, or on three
  * scenes while it made no image at all? made: of the images before it; *out says so. */

@@ -28,8 +28,8 @@ struct traits {
 /* Of results.json the claims that should be EQUIVALENT, are that or DIFFERENT, and are about the program that most that
  * differ are about; those of consistency among them (a: "PROGRAM-consistency") if one of these differs. If none differs,
  * no claims, and the suite is not opened. claim_traits_free() afterwards. */
-bool claim_traits_collect(const json_t *results, const char *suite_dir, struct traits *out,
-                          struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool claim_traits_collect(const json_t *results, const char *suite_dir,
+                                    struct traits *out, struct err *e);
 void claim_traits_free(struct traits *t);
 
 #endif

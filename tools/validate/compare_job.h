@@ -43,11 +43,10 @@ struct compared {
 
 /* Fills in what follows from other options (margin_tile below 0, accept_mdb[1] 0: four times the image's; what is expected) and
  * fails with a line where two do not go together, in the words of the command. */
-bool compare_job_check(struct compare_job *job, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool compare_job_check(struct compare_job *job, struct err *e);
 
 /* Reads, compares, and, with a second pair, confirms. The caller frees with compare_job_free(). */
-bool compare_job_run(const struct compare_job *job, struct compared *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool compare_job_run(const struct compare_job *job, struct compared *out, struct err *e);
 void compare_job_free(struct compared *c);
 /* Did what was expected come out (claim_result_passes())? */
 bool compare_job_passes(const struct compare_job *job, const struct compared *c);
@@ -55,8 +54,7 @@ bool compare_job_passes(const struct compare_job *job, const struct compared *c)
 /* results.json at `path` with one claim, and beside it what the report shows: PATH.z.exr,
  * PATH.relative.exr and, for sides that are no moments EXR, PATH.a.exr and PATH.b.exr. argc, argv:
  * the command line. */
-bool compare_job_write_json(const struct compare_job *job, const struct compared *c,
-                            const char *path, int argc, char **argv, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool compare_job_write_json(const struct compare_job *job, const struct compared *c,
+                                      const char *path, int argc, char **argv, struct err *e);
 
 #endif

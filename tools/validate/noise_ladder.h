@@ -42,9 +42,8 @@ void noise_ladder_free(struct noise_ladder *l);
 
 /* The unit of a scene at images `shrink` times smaller: its first reference, a closed form before all others; fails where
  * that is not stored. */
-bool noise_ladder_unit(const char *golden_dir, const struct suite_scene *scene, int shrink,
-                       struct converge_reference *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool noise_ladder_unit(const char *golden_dir, const struct suite_scene *scene,
+                                 int shrink, struct converge_reference *out, struct err *e);
 
 /* "pathtracer" or "pathtracer-sobol", by running the program. */
 struct noise_job {
@@ -65,13 +64,12 @@ struct noise_renders {
 };
 void noise_ladder_renders_free(struct noise_renders *r);
 /* Renders up to `count` replicates of each rung, those of *r among them (all zero at first); *out: the ladder of them. */
-bool noise_ladder_render(const struct noise_job *job, int count, struct noise_renders *r,
-                         struct noise_ladder *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool noise_ladder_render(const struct noise_job *job, int count, struct noise_renders *r,
+                                   struct noise_ladder *out, struct err *e);
 /* One more rung from images of any engine; the first one is also its `sample`. */
-bool noise_ladder_add(struct noise_ladder *l, const float *images, int spp, double cpu_s,
-                      const struct converge_reference *unit, int width, int tile, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool noise_ladder_add(struct noise_ladder *l, const float *images, int spp, double cpu_s,
+                                const struct converge_reference *unit, int width, int tile,
+                                struct err *e);
 
 /* No rung has noise. */
 bool noise_ladder_is_silent(const struct noise_ladder *l);
@@ -84,15 +82,14 @@ bool noise_ladder_efficiency(const struct noise_ladder *l, struct estimate *log_
 /* As an entry of noise.json; seed, version and so on are the caller's. NULL out of memory. */
 json_t *noise_ladder_json(const struct noise_ladder *l);
 /* Reads it back; fails on anything that is not that, and on an entry of another scene file or other settings ("stale"). */
-bool noise_ladder_parse(const json_t *entry, const struct suite_scene *scene,
-                        struct noise_ladder *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool noise_ladder_parse(const json_t *entry, const struct suite_scene *scene,
+                                  struct noise_ladder *out, struct err *e);
 
 /* Does the directory hold the noise of any scene of the suite? Then it should hold that of all. */
 bool noise_ladder_is_kept(const char *golden_dir, const struct suite *suite);
 /* golden/<scene>/noise.json: the whole of it, an empty object if there is none. NULL with a line if it cannot be read. */
 json_t *noise_ladder_load(const char *golden_dir, const char *scene, struct err *e);
-bool noise_ladder_store(const char *golden_dir, const char *scene, const json_t *all, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool noise_ladder_store(const char *golden_dir, const char *scene, const json_t *all,
+                                  struct err *e);
 
 #endif

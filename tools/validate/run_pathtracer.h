@@ -24,8 +24,7 @@ struct pathtracer_rays {
 
 /* The image's moments, the CPU time it took and its rays (may be NULL). Fails with the program's last line if it
  * fails, and on an image of another size. */
-bool run_pathtracer(const struct pathtracer_job *job, struct moments *out, double *cpu_s,
-                    struct pathtracer_rays *rays, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool run_pathtracer(const struct pathtracer_job *job, struct moments *out, double *cpu_s,
+                              struct pathtracer_rays *rays, struct err *e);
 
 #endif

@@ -8,9 +8,10 @@
 /* Judges path[0] against path[1]: two images, of any kind that input.h takes, a PNG without its curve too, or two directories
  * of equally many; or memory[], where that is not NULL. m: moments of both if both state theirs, for their stated errors, or NULL; then both need equally
  * many samples. Fails with a line where that is not so, where sizes differ, and as sign_flip_test() does. */
-bool same_program_judge(const char *const path[2], const struct input_memory *const memory[2],
-                        const struct moments *m, const struct sign_flip_options *opt,
-                        struct sign_flip *out, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool same_program_judge(const char *const path[2],
+                                  const struct input_memory *const memory[2],
+                                  const struct moments *m, const struct sign_flip_options *opt,
+                                  struct sign_flip *out, struct err *e);
 
 /* Verdict, reason and MDBs of the claim. */
 void same_program_decide(const struct sign_flip *f, double alpha, struct comparison *r);

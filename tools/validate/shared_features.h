@@ -10,7 +10,7 @@
  * how many of those that came out EQUIVALENT have it too, what is nearly as likely, and their scenes; or that they share
  * nothing. How: tools/docs/background/diagnosis.md. Empty if none differs; else the suite of results (results.json) is
  * opened. */
-bool shared_features_tell(const json_t *results, const char *suite_dir, char *text, size_t size,
-                          struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool shared_features_tell(const json_t *results, const char *suite_dir, char *text,
+                                    size_t size, struct err *e);
 
 #endif

@@ -60,8 +60,8 @@ struct validate_options {
  * With `live`, "loader" in the results is what import_check() says of the same scenes. A claim that
  * cannot be judged is in the results with its error; false only if nothing could be judged at all
  * (no suite, no output directory, a further engine that can express none of the scenes). */
-bool validate(const struct validate_options *opt, int argc, char **argv, json_t **results,
-              struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool validate(const struct validate_options *opt, int argc, char **argv, json_t **results,
+                        struct err *e);
 
 /* One of the parts that together judge what one run does, with the same bits: what of the scene to give as `only`. */
 struct validate_part {
@@ -71,11 +71,12 @@ struct validate_part {
 };
 /* Calls for each scene that has claims, or for each claim, in the order of the results; stops where that returns false, and
  * returns it. Fails where validate() would before it judges. */
-bool validate_parts(const struct validate_options *opt, bool by_claim,
-                    bool (*part)(void *ctx, const struct validate_part *part, struct err *e),
-                    void *ctx, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool validate_parts(const struct validate_options *opt, bool by_claim,
+                              bool (*part)(void *ctx, const struct validate_part *part,
+                                           struct err *e),
+                              void *ctx, struct err *e);
 /* *results as validate() on the whole, with all lists empty. */
-bool validate_start(const struct validate_options *opt, int argc, char **argv, json_t **results,
-                    struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool validate_start(const struct validate_options *opt, int argc, char **argv,
+                              json_t **results, struct err *e);
 
 #endif

@@ -16,8 +16,8 @@ struct validate_command {
 };
 
 /* *c has to stay where it is. */
-bool validate_command_read(int argc, char **argv, struct validate_command *c, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool validate_command_read(int argc, char **argv, struct validate_command *c,
+                                     struct err *e);
 /* Adds what the claims that differ share to the results, writes results.json, junit.xml and the page, prints the table;
  * the exit code. */
 int validate_command_finish(const struct validate_command *c, json_t *results, struct err *e);

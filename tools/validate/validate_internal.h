@@ -109,8 +109,8 @@ double side_cost(const struct side *s, int look);
 enum fetch_result side_at(struct validation *v, struct side *s, int stage, int look,
                           struct side_image **out);
 /* Writes it for the report, once; file, relative to out_dir, has 256 characters. */
-bool side_write(const struct validation *v, struct side *s, int stage, int look, char file[256],
-                struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool side_write(const struct validation *v, struct side *s, int stage, int look,
+                          char file[256], struct err *e);
 void side_free(struct side *s);
 
 /* Does --only want any, does it want all of a scene's claims? */
@@ -120,8 +120,7 @@ bool scene_is_selected_whole(const struct validate_options *o, const char *name)
 void claim_run_name(const struct claim_run *t, char name[CLAIM_NAME]);
 /* Sides and tasks of all selected scenes and claims; scenes that the further engine cannot express are appended to
  * `cannot`. Fails on an unknown name, and where the engine can express none, unless this run is part of a larger one. */
-bool select_claims(struct validation *v, json_t *cannot, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool select_claims(struct validation *v, json_t *cannot, struct err *e);
 /* Whether t->next is a look at which anything is new; else moves on to the next that is, or to
  * NUM_LOOKS. */
 void claim_next_look(struct claim_run *t);

@@ -36,8 +36,7 @@ struct anchor_job {
 };
 
 /* The caller frees. */
-bool anchor_render(const struct anchor_job *job, struct anchor_pool *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool anchor_render(const struct anchor_job *job, struct anchor_pool *out, struct err *e);
 void anchor_pool_free(struct anchor_pool *p);
 
 /* The standard deviation of one sample over the mean, of the image's luminance: a scene's noise. */

@@ -78,11 +78,9 @@ struct anchor_results {
     struct anchor_scene_result scene[NUM_ANCHOR_SCENES];
 };
 
-bool anchors_save(const char *path, const struct anchor_results *r, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool anchors_save(const char *path, const struct anchor_results *r, struct err *e);
 /* Fails with a line on a missing file or member. */
-bool anchors_load(const char *path, struct anchor_results *r, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool anchors_load(const char *path, struct anchor_results *r, struct err *e);
 
 /* The order statistics (from 0) of a sample of n that estimate the quantile p and bound it with 95 %:
  * *at = ceil(p n) - 1; P(X(*lo) <= quantile) and P(X(*hi) >= quantile) are each at least 97.5 %. *hi is
@@ -90,12 +88,11 @@ bool anchors_load(const char *path, struct anchor_results *r, struct err *e)
 void anchors_quantile_ranks(int n, double p, int *at, int *lo, int *hi);
 
 /* README.md and its two plots into a directory. */
-bool anchors_write_page(const char *dir, const struct anchor_results *r, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool anchors_write_page(const char *dir, const struct anchor_results *r, struct err *e);
 /* One dot and interval for each scene and rule on a logarithmic axis; rules that call most equal pairs
  * different are shown as such. */
-bool anchors_write_plot(const char *path, const struct anchor_results *r, enum anchor_error kind,
-                        const char *title, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool anchors_write_plot(const char *path, const struct anchor_results *r,
+                                  enum anchor_error kind, const char *title, struct err *e);
 
 /* A rule whose false alarms are more than 1 in 20 has no bias to speak of. */
 bool anchors_useless(const struct anchor_results *r, const struct anchor_outcome *o);

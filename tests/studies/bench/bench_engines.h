@@ -31,8 +31,8 @@ struct bench_view {
 /* Renders count >= 3 images of spp samples, one after the other into images (3 floats a pixel), on one
  * thread. *cpu_s: of all of it; children, their start and what writes their input are part of it. work_dir
  * exists. */
-bool bench_engine_render(enum bench_engine engine, const struct bench_view *v, int spp, int count,
-                         uint32_t seed, const char *work_dir, float *images, double *cpu_s,
-                         struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool bench_engine_render(enum bench_engine engine, const struct bench_view *v, int spp,
+                                   int count, uint32_t seed, const char *work_dir, float *images,
+                                   double *cpu_s, struct err *e);
 
 #endif

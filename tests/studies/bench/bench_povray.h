@@ -5,7 +5,7 @@
 #include "bench_engines.h"
 
 /* Image i of grid x grid points a pixel. */
-bool bench_povray(const struct bench_view *v, int grid, int i, uint32_t seed, const char *work_dir,
-                  float *image, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool bench_povray(const struct bench_view *v, int grid, int i, uint32_t seed,
+                            const char *work_dir, float *image, struct err *e);
 
 #endif

@@ -17,8 +17,7 @@ const char *bench_scene_name(int i);
 
 /* Loads the one of that name; scene_free(&out->scene). False, saying so on standard output, if it is the course's
  * and not here; exits with status 3 and a line where it cannot be read. */
-bool bench_scene_load(const char *name, struct bench_scene *out)
-    __attribute__((warn_unused_result));
+NODISCARD bool bench_scene_load(const char *name, struct bench_scene *out);
 
 /* Smallest box around all primitives; generated scenes have no bounds of their own. */
 void bench_scene_bounds(const struct scene *s, vec3 *lo, vec3 *hi);

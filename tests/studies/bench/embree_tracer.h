@@ -11,8 +11,7 @@ struct embree_tracer;
 
 /* Refers to the scene, which must outlive it. Fails on materials that are not diffuse and on lights that are
  * not triangles. */
-struct embree_tracer *embree_tracer_new(const struct scene *s, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD struct embree_tracer *embree_tracer_new(const struct scene *s, struct err *e);
 void embree_tracer_free(struct embree_tracer *t);
 
 /* Means of spp paths a pixel, of up to `depth` bounces as -m counts them; 3 floats a pixel. */

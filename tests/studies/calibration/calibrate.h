@@ -59,8 +59,8 @@ struct results {
 };
 
 /* Runs all of it. w->total is raised by what is to come. `scenes`: the suite's directory. */
-bool calibrate(struct work *w, const struct settings *s, const char *scenes, enum weakness weakness,
-               struct results *out, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool calibrate(struct work *w, const struct settings *s, const char *scenes,
+                         enum weakness weakness, struct results *out, struct err *e);
 double calibrate_cost(const struct settings *s);
 /* Every acceptance line of the results. */
 void calibrate_check(const struct settings *s, const struct results *r, struct checks *c);
@@ -71,12 +71,11 @@ struct weak_results {
 };
 
 /* The page: writes README.md and the plots into `dir`, which it makes. `command` made them. */
-bool page_write(const char *dir, const char *command, const struct settings *s,
-                const struct results *r, const struct weak_results *weak, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool page_write(const char *dir, const char *command, const struct settings *s,
+                          const struct results *r, const struct weak_results *weak, struct err *e);
 
 /* The plots alone: false_alarms.svg, statistics.svg, tail.svg, power.svg. */
-bool page_draw(const char *dir, const struct settings *s, const struct results *r, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool page_draw(const char *dir, const struct settings *s, const struct results *r,
+                         struct err *e);
 
 #endif

@@ -21,8 +21,8 @@ struct stages_result {
     char name[64];
     double alpha, pairs, flagged, different;
 };
-bool stages_run(struct work *w, const struct stages_cell *cell, size_t pairs, size_t blocks,
-                struct stages_result *out, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool stages_run(struct work *w, const struct stages_cell *cell, size_t pairs,
+                          size_t blocks, struct stages_result *out, struct err *e);
 double stages_cost(const struct stages_cell *cell, size_t pairs);
 /* Flagged with at most the root of alpha, DIFFERENT with at most alpha. */
 bool stages_check(const struct stages_result *r, struct checks *c);
@@ -43,9 +43,8 @@ struct permutation_result {
     bool is_flips;
     double pairs, rejected[NUM_PERMUTATION_LEVELS];
 };
-bool permutations_run(struct work *w, const struct permutation_cell *cell, size_t pairs,
-                      struct permutation_result *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool permutations_run(struct work *w, const struct permutation_cell *cell, size_t pairs,
+                                struct permutation_result *out, struct err *e);
 double permutations_cost(size_t pairs);
 bool permutations_check(const struct permutation_result *r, struct checks *c);
 

@@ -25,12 +25,12 @@ struct null_run {
     float *mean_t;              /* of the image's luminance, at LEVEL_SHAPE */
 };
 /* Fails only out of memory. Release with null_free(). */
-bool null_init(struct null_run *r, enum weakness weakness, const size_t pairs[NUM_LEVELS],
-               struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool null_init(struct null_run *r, enum weakness weakness, const size_t pairs[NUM_LEVELS],
+                         struct err *e);
 void null_free(struct null_run *r);
 /* Runs pair i at every level that wants it; margins 0, that of the variance 0.1 %. */
-bool null_pair(struct null_run *r, size_t i, const struct moments *a, const struct moments *b,
-               int tile, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool null_pair(struct null_run *r, size_t i, const struct moments *a,
+                         const struct moments *b, int tile, struct err *e);
 
 struct null_result {
     char name[64];
@@ -46,8 +46,8 @@ struct null_result {
 };
 
 /* Counts; false only out of memory. */
-bool null_summary(const struct null_run *r, const char *name, bool is_exact,
-                  struct null_result *out, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool null_summary(const struct null_run *r, const char *name, bool is_exact,
+                            struct null_result *out, struct err *e);
 /* Sums the counts and averages the curves; leaves out what needs every p. */
 void null_pool(const struct null_result *part, int num, const char *name, struct null_result *out);
 

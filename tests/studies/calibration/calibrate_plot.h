@@ -27,7 +27,6 @@ struct drawing {
 
 /* Appends a point; what the axes cannot show is cut at their ends. */
 void drawing_add(struct drawing_series *s, double x, double y, double lo, double hi);
-bool drawing_write(const char *path, const struct drawing *d, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool drawing_write(const char *path, const struct drawing *d, struct err *e);
 
 #endif

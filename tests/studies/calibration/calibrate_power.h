@@ -31,9 +31,8 @@ struct power_result {
     double pairs;               /* at each bias */
     double found[POWER_POINTS]; /* DIFFERENT */
 };
-bool power_run(struct work *w, const struct power_cell *cell, enum weakness weakness, size_t pairs,
-               size_t blocks, struct power_result *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool power_run(struct work *w, const struct power_cell *cell, enum weakness weakness,
+                         size_t pairs, size_t blocks, struct power_result *out, struct err *e);
 double power_cost(const struct power_cell *cell, size_t pairs);
 /* The bias found with 95 %, between the points by the normal quantile of the rate; 0 if not reached. */
 double power_95(const struct power_result *r);
@@ -55,9 +54,8 @@ struct cover_result {
     double alpha, pairs;
     double valid[2], missed[2]; /* image, tile: with an interval, and with one that 0 is not in */
 };
-bool cover_run(struct work *w, const struct cover_cell *cell, enum weakness weakness, size_t pairs,
-               size_t blocks, struct cover_result *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool cover_run(struct work *w, const struct cover_cell *cell, enum weakness weakness,
+                         size_t pairs, size_t blocks, struct cover_result *out, struct err *e);
 double cover_cost(const struct cover_cell *cell, size_t pairs);
 /* Neither misses more often than 2 alpha. */
 bool cover_check(const struct cover_result *r, struct checks *c);
@@ -75,9 +73,8 @@ struct margin_result {
     double equivalent[3]; /* image outside, tile outside, no bias */
     double different[2];  /* the first two: wrong as well, the bias is at the edge */
 };
-bool margin_run(struct work *w, const struct margin_cell *cell, enum weakness weakness,
-                size_t pairs, size_t blocks, struct margin_result *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool margin_run(struct work *w, const struct margin_cell *cell, enum weakness weakness,
+                          size_t pairs, size_t blocks, struct margin_result *out, struct err *e);
 double margin_cost(const struct margin_cell *cell, size_t pairs);
 bool margin_check(const struct margin_result *r, struct checks *c);
 

@@ -14,9 +14,9 @@ struct render_cell {
 };
 
 /* The suite in `scenes` ("reference/scenes"). Every pair runs at all levels. */
-bool render_run(struct work *w, const char *scenes, const struct render_cell *cell,
-                enum weakness weakness, size_t pairs, struct null_result *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool render_run(struct work *w, const char *scenes, const struct render_cell *cell,
+                          enum weakness weakness, size_t pairs, struct null_result *out,
+                          struct err *e);
 double render_cost(const struct render_cell *cell, size_t pairs);
 
 #endif

@@ -19,9 +19,9 @@ void synthetic_name(const struct synthetic_cell *cell, char *text, size_t size);
 
 /* pairs[l] pairs at each level; `blocks` of the library. The result depends on neither threads nor
  * machine. */
-bool synthetic_run(struct work *w, const struct synthetic_cell *cell, enum weakness weakness,
-                   const size_t pairs[NUM_LEVELS], size_t blocks, struct null_result *out,
-                   struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool synthetic_run(struct work *w, const struct synthetic_cell *cell,
+                             enum weakness weakness, const size_t pairs[NUM_LEVELS], size_t blocks,
+                             struct null_result *out, struct err *e);
 /* About CPU milliseconds of it. */
 double synthetic_cost(const struct synthetic_cell *cell, const size_t pairs[NUM_LEVELS]);
 
@@ -32,8 +32,8 @@ struct tail_result {
     double regions, tested, rejected[3];
 };
 extern const double tail_level[3];
-bool tail_run(struct work *w, const struct synthetic_cell *cell, size_t regions, size_t blocks,
-              struct tail_result *out, struct err *e) __attribute__((warn_unused_result));
+NODISCARD bool tail_run(struct work *w, const struct synthetic_cell *cell, size_t regions,
+                        size_t blocks, struct tail_result *out, struct err *e);
 double tail_cost(const struct synthetic_cell *cell, size_t regions);
 /* The guard lets a region pass if its p is right within a factor of e^0.2: its rate is at most that
  * many times the level. */

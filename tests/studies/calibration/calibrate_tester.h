@@ -34,8 +34,7 @@ struct outcome {
 };
 
 /* Fails as compare_moments() does. */
-bool tester_run(enum weakness weakness, const struct moments *a, const struct moments *b,
-                const struct compare_options *opt, struct outcome *out, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool tester_run(enum weakness weakness, const struct moments *a, const struct moments *b,
+                          const struct compare_options *opt, struct outcome *out, struct err *e);
 
 #endif

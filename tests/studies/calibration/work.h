@@ -15,10 +15,9 @@ struct work {
 typedef bool work_job(void *arg, int job, struct err *e);
 
 /* Runs jobs 0 .. num-1, each about `cost` CPU milliseconds; false with the first error. */
-bool work_run(struct work *w, int num, double cost, work_job *job, void *arg, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool work_run(struct work *w, int num, double cost, work_job *job, void *arg,
+                        struct err *e);
 /* The same on all processors, and silent. */
-bool work_run_all(int num, work_job *job, void *arg, struct err *e)
-    __attribute__((warn_unused_result));
+NODISCARD bool work_run_all(int num, work_job *job, void *arg, struct err *e);
 
 #endif
