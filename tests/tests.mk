@@ -212,9 +212,9 @@ blender-scenes: all
 calibrate: $(BUILD)/tests/make_calibration
 	$< --threads $(shell nproc) $(if $(SHARE),--share $(SHARE) $(BUILD)/calibration,tests/studies/calibration)
 #: make anchors    what our tests and the rules of other renderers find on the same images
-#:                 (tests/studies/anchors; 20 CPU minutes, 900 MB)
+#:                 (tests/studies/anchors; 20 CPU minutes)
 anchors: $(BUILD)/tests/make_anchors $(BUILD)/oiio.so
-	$< tests/studies/anchors $(BUILD)/anchors
+	$< tests/studies/anchors
 #: make bench      speed against Embree, Cycles and POV-Ray (BUILD/bench); bench-rays: a part of it
 bench bench-rays: $(BUILD)/deps-test $(BUILD)/tests/bench $(BUILD)/pathtracer
 	$(BUILD)/tests/bench --build $(BUILD) --out $(BUILD)/$@ $(patsubst bench-%,%,$(filter-out bench,$@))

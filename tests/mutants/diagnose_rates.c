@@ -96,7 +96,7 @@ static bool look_once(void *arg, int i, struct err *e)
 static bool look_at_all(const struct rate_image *r, struct claim_run *task, int num, struct err *e)
 {
     struct looks looks = {r, task};
-    return work_run_all(num, look_once, &looks, e);
+    return work_run_all(NULL, num, look_once, &looks, e);
 }
 
 static void free_tasks(struct claim_run *task, int num)

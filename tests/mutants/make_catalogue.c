@@ -257,7 +257,7 @@ static bool make_view(struct maker *m, int i, struct err *e)
         ok = make_batches(base, program, e) &&
              (v->correct.columns > 0 || make_correct(base, program, v, e));
     struct effects effects = {m, base, v, missing};
-    ok = ok && work_run_all(m->made.num_bugs, make_missing, &effects, e);
+    ok = ok && work_run_all(NULL, m->made.num_bugs, make_missing, &effects, e);
     int seen = 0;
     for (int b = 0; ok && b < m->made.num_bugs; b++)
         seen += v->effect[b] != NULL;

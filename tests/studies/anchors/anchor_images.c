@@ -1,60 +1,19 @@
 #include "anchor_images.h"
 
 #include "reference/suite/suite.h"
-#include "renderer/base/fs.h"
 #include "renderer/transport/render.h"
+#include "tests/studies/calibration/work.h"
 
 #include <assert.h>
 #include <math.h>
-#include <pthread.h>
-#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { MAX_THREADS = 64 };
-
-struct crew {
-    int n;
-    atomic_int next;
-    void (*fn)(void *arg, int i, int thread);
-    void *arg;
-};
-
-struct worker {
-    struct crew *crew;
-    int number;
-    pthread_t thread;
-};
-
-static void *work(void *arg)
-{
-    struct worker *w = arg;
-    for (int i; (i = atomic_fetch_add(&w->crew->next, 1)) < w->crew->n;)
-        w->crew->fn(w->crew->arg, i, w->number);
-    return NULL;
-}
-
-void anchor_parallel(int n, int threads, void (*fn)(void *arg, int i, int thread), void *arg)
-{
-    struct crew crew = {.n = n, .fn = fn, .arg = arg};
-    struct worker worker[MAX_THREADS];
-    assert(threads >= 1 && threads <= MAX_THREADS);
-    int started = 1;
-    for (int t = 0; t < threads; t++)
-        worker[t] = (struct worker){.crew = &crew, .number = t};
-    while (started < threads &&
-           pthread_create(&worker[started].thread, NULL, work, &worker[started]) == 0)
-        started++;
-    work(&worker[0]);
-    for (int t = 1; t < started; t++)
-        pthread_join(worker[t].thread, NULL);
-}
-
 /* One scene being rendered. Blocks of the reference are 64 samples; each is a job as a render is. */
 enum { BLOCK = 64, EMITTED_SPP = 1024 };
 
-struct crew_job {
+struct rendering {
     struct scene scene;
     struct camera camera;
     struct bvh *bvh;
@@ -63,11 +22,9 @@ struct crew_job {
     int depth, blocks;
     struct moments *block_rgb, *block_xyz;
     struct moments emitted;
-    atomic_int done, failed;
-    struct err error; /* of the thread that set failed first */
 };
 
-static bool render_one(struct crew_job *j, int depth, uint64_t seed, int first, int spp,
+static bool render_one(struct rendering *j, int depth, uint64_t seed, int first, int spp,
                        struct moments *out, struct err *e)
 {
     struct progress quiet;
@@ -90,7 +47,7 @@ static bool render_one(struct crew_job *j, int depth, uint64_t seed, int first, 
 }
 
 /* Moments of single samples in XYZ need the samples one at a time. */
-static bool render_block(struct crew_job *j, int i, struct err *e)
+static bool render_block(struct rendering *j, int i, struct err *e)
 {
     if (!moments_alloc(&j->block_rgb[i], j->pool->side, j->pool->side, e) ||
         !moments_alloc(&j->block_xyz[i], j->pool->side, j->pool->side, e))
@@ -110,26 +67,15 @@ static bool render_block(struct crew_job *j, int i, struct err *e)
     return true;
 }
 
-static void render_any(void *arg, int i, int thread)
+static bool render_any(void *arg, int i, struct err *e)
 {
-    struct crew_job *j = arg;
+    struct rendering *j = arg;
     struct anchor_pool *p = j->pool;
-    struct err e = {""};
-    bool ok;
-    if (atomic_load(&j->failed))
-        return;
-    if (i < p->num_renders) {
-        moments_free(&p->render[i]);
-        ok = render_one(j, j->depth, j->job->seed + 1 + (uint64_t)i, 0, p->spp, &p->render[i], &e);
-    } else if (i < p->num_renders + j->blocks)
-        ok = render_block(j, i - p->num_renders, &e);
-    else
-        ok = render_one(j, 0, j->job->seed, 0, EMITTED_SPP, &j->emitted, &e);
-    if (!ok && !atomic_exchange(&j->failed, 1))
-        j->error = e;
-    int done = atomic_fetch_add(&j->done, 1) + 1;
-    if (thread == 0 && j->job->progress != NULL)
-        j->job->progress((double)done / (p->num_renders + j->blocks + 1));
+    if (i < p->num_renders)
+        return render_one(j, j->depth, j->job->seed + 1 + (uint64_t)i, 0, p->spp, &p->render[i], e);
+    if (i < p->num_renders + j->blocks)
+        return render_block(j, i - p->num_renders, e);
+    return render_one(j, 0, j->job->seed, 0, EMITTED_SPP, &j->emitted, e);
 }
 
 static double luminance_of(const double c[3])
@@ -163,7 +109,7 @@ static void choose_places(struct anchor_pool *p)
             }
 }
 
-static bool finish(struct crew_job *j, struct err *e)
+static bool finish(struct rendering *j, struct err *e)
 {
     struct anchor_pool *p = j->pool;
     size_t values = 3 * (size_t)p->side * (size_t)p->side;
@@ -171,7 +117,6 @@ static bool finish(struct crew_job *j, struct err *e)
         if (!moments_merge(&j->block_rgb[0], &j->block_rgb[i], e) ||
             !moments_merge(&j->block_xyz[0], &j->block_xyz[i], e))
             return false;
-    moments_free(&p->expected);
     p->expected = j->block_rgb[0];
     j->block_rgb[0] = (struct moments){0};
     for (size_t i = 0; i < values; i++) {
@@ -183,126 +128,28 @@ static bool finish(struct crew_job *j, struct err *e)
     return true;
 }
 
-/* What a file of kept images was made for. */
-struct kept_header {
-    char magic[16], sha256[72];
-    int32_t side, spp, num_renders, reference_spp;
-    uint64_t seed;
-};
-
-static struct kept_header header_of(const struct anchor_job *job, const struct suite_scene *scene)
+static bool render_pool(struct rendering *j, struct err *e)
 {
-    struct kept_header h = {.magic = "assay anchors 1",
-                            .side = job->side,
-                            .spp = job->spp,
-                            .num_renders = job->num_renders,
-                            .reference_spp = job->reference_spp,
-                            .seed = job->seed};
-    snprintf(h.sha256, sizeof h.sha256, "%s", scene->sha256);
-    return h;
-}
-
-/* All arrays of the pool in order, through fn (fread or fwrite); `n` of moments is known. */
-typedef bool transfer(FILE *f, double *values, size_t num);
-
-static bool put(FILE *f, double *values, size_t num)
-{
-    return fwrite(values, sizeof *values, num, f) == num;
-}
-
-static bool get(FILE *f, double *values, size_t num)
-{
-    return fread(values, sizeof *values, num, f) == num;
-}
-
-static bool transfer_pool(FILE *f, struct anchor_pool *p, transfer *fn)
-{
+    struct anchor_pool *p = j->pool;
     size_t values = 3 * (size_t)p->side * (size_t)p->side;
-    for (int i = -1; i < p->num_renders; i++) {
-        struct moments *m = i < 0 ? &p->expected : &p->render[i];
-        if (!fn(f, m->mean, values) || !fn(f, m->m2, values) || !fn(f, m->m3, values))
-            return false;
-    }
-    return fn(f, p->reference.mean, values) && fn(f, p->reference.var, values) &&
-           fn(f, p->bounced, values);
-}
-
-static bool alloc_pool(const struct anchor_job *job, struct anchor_pool *p, struct err *e)
-{
-    size_t values = 3 * (size_t)p->side * (size_t)p->side;
+    j->blocks = j->job->reference_spp / BLOCK;
+    assert(j->blocks >= 1 && j->blocks * BLOCK == j->job->reference_spp);
     p->render = calloc((size_t)p->num_renders, sizeof *p->render);
     p->reference = (struct mitsuba_reference){.width = p->side,
                                               .height = p->side,
                                               .mean = calloc(values, sizeof(double)),
                                               .var = calloc(values, sizeof(double))};
     p->bounced = calloc(values, sizeof *p->bounced);
-    if (p->render == NULL || p->reference.mean == NULL || p->reference.var == NULL ||
-        p->bounced == NULL)
-        return err_set(e, "out of memory for %d renders", p->num_renders);
-    for (int i = -1; i < p->num_renders; i++) {
-        struct moments *m = i < 0 ? &p->expected : &p->render[i];
-        if (!moments_alloc(m, p->side, p->side, e))
-            return false;
-        for (size_t k = 0; k < values / 3; k++)
-            m->n[k] = i < 0 ? job->reference_spp : job->spp;
-    }
-    return true;
-}
-
-/* False, without a reason, if there is no file that can be believed. */
-static bool read_kept(struct crew_job *j, const struct kept_header *want)
-{
-    struct kept_header got;
-    struct moments first;
-    struct err e;
-    FILE *f = j->job->kept != NULL ? fopen(j->job->kept, "rb") : NULL;
-    if (f == NULL)
-        return false;
-    bool ok = fread(&got, sizeof got, 1, f) == 1 && memcmp(&got, want, sizeof got) == 0 &&
-              transfer_pool(f, j->pool, get) && fgetc(f) == EOF;
-    fclose(f);
-    if (!ok || !render_one(j, j->depth, j->job->seed + 1, 0, j->job->spp, &first, &e))
-        return false;
-    size_t bytes = 3 * (size_t)first.width * (size_t)first.height * sizeof(double);
-    ok = memcmp(first.mean, j->pool->render[0].mean, bytes) == 0 &&
-         memcmp(first.m3, j->pool->render[0].m3, bytes) == 0;
-    moments_free(&first);
-    return ok;
-}
-
-static bool write_kept(const struct crew_job *j, const struct kept_header *h, struct err *e)
-{
-    struct out_file o;
-    if (j->job->kept == NULL)
-        return true;
-    if (!fs_make_parent_dirs(j->job->kept, e) || !out_open(&o, j->job->kept, e))
-        return false;
-    fwrite(h, sizeof *h, 1, o.f); /* out_commit() asks ferror() */
-    transfer_pool(o.f, j->pool, put);
-    return out_commit(&o, e);
-}
-
-static bool render_pool(struct crew_job *j, struct err *e)
-{
-    j->blocks = j->job->reference_spp / BLOCK;
-    assert(j->blocks >= 1 && j->blocks * BLOCK == j->job->reference_spp);
     j->block_rgb = calloc((size_t)j->blocks, sizeof *j->block_rgb);
     j->block_xyz = calloc((size_t)j->blocks, sizeof *j->block_xyz);
-    bool ok = j->block_rgb != NULL && j->block_xyz != NULL;
-    if (!ok)
-        err_set(e, "out of memory for a reference");
-    if (ok)
-        anchor_parallel(j->pool->num_renders + j->blocks + 1, j->job->threads, render_any, j);
-    if (ok && atomic_load(&j->failed)) {
-        *e = j->error;
-        ok = false;
-    }
-    ok = ok && finish(j, e);
-    for (int i = 0; i < j->blocks; i++) {
-        if (j->block_rgb != NULL)
-            moments_free(&j->block_rgb[i]);
-        if (j->block_xyz != NULL)
-            moments_free(&j->block_xyz[i]);
+    bool ok = (p->render != NULL && p->reference.mean != NULL && p->reference.var != NULL &&
+               p->bounced != NULL && j->block_rgb != NULL && j->block_xyz != NULL) ||
+              err_set(e, "out of memory for %d renders", p->num_renders);
+    ok = ok && work_run_all(j->job->what, p->num_renders + j->blocks + 1, render_any, j, e) &&
+         finish(j, e);
+    for (int i = 0; j->block_rgb != NULL && j->block_xyz != NULL && i < j->blocks; i++) {
+        moments_free(&j->block_rgb[i]);
+        moments_free(&j->block_xyz[i]);
     }
     free(j->block_rgb);
     free(j->block_xyz);
@@ -310,17 +157,15 @@ static bool render_pool(struct crew_job *j, struct err *e)
     return ok;
 }
 
-static bool open_and_render(struct crew_job *j, const struct suite_scene *scene, struct err *e)
+static bool open_and_render(struct rendering *j, const struct suite_scene *scene, struct err *e)
 {
-    const struct kept_header h = header_of(j->job, scene);
     struct suite_scene square = *scene; /* another size of image: the camera knows its shape */
     square.width = square.height = j->job->side;
     if (!suite_open(&square, &j->scene, &j->camera, e))
         return false;
     j->depth = scene->depth;
     j->bvh = bvh_build(&j->scene, BVH_SAH, e);
-    bool ok = j->bvh != NULL && alloc_pool(j->job, j->pool, e) &&
-              (read_kept(j, &h) || (render_pool(j, e) && write_kept(j, &h, e)));
+    bool ok = j->bvh != NULL && render_pool(j, e);
     if (ok) {
         choose_places(j->pool);
         ok = j->pool->num_places > 0 || err_set(e, "no place for a local error");
@@ -338,15 +183,12 @@ bool anchor_render(const struct anchor_job *job, struct anchor_pool *out, struct
     if (!suite_load("reference/scenes", &suite, e))
         return false;
     const struct suite_scene *s = suite_find(&suite, job->scene);
-    struct crew_job *j = calloc(1, sizeof *j);
-    bool ok = (s != NULL && j != NULL) || err_set(e, "%s: no such scene, or no memory", job->scene);
+    struct rendering j = {.pool = out, .job = job};
+    bool ok = s != NULL || err_set(e, "%s: no such scene", job->scene);
     if (ok) {
         snprintf(out->title, sizeof out->title, "%s", s->title);
-        j->pool = out;
-        j->job = job;
-        ok = open_and_render(j, s, e);
+        ok = open_and_render(&j, s, e);
     }
-    free(j);
     suite_free(&suite);
     if (!ok)
         anchor_pool_free(out);

@@ -6,9 +6,6 @@
 
 #include "anchor_rules.h"
 
-/* Calls fn(arg, i, thread) for i = 0 .. n-1 from that many threads, in any order, `thread` from 0. */
-void anchor_parallel(int n, int threads, void (*fn)(void *arg, int i, int thread), void *arg);
-
 struct anchor_pool {
     char title[128];
     int side, spp, num_renders;
@@ -26,13 +23,8 @@ struct anchor_pool {
 struct anchor_job {
     const char *scene; /* of reference/scenes, with its own depth */
     int side, spp, num_renders, reference_spp;
-    uint64_t seed; /* of the reference; the renders' count up from there */
-    int threads;
-    /* A file that keeps the images, so that a change of a rule need not render again; NULL: none. It
-     * is believed if it was made for the same job and its first image is still what the renderer
-     * draws, bit for bit; else it is written again. */
-    const char *kept;
-    void (*progress)(double share); /* from 0 to 1; NULL: none */
+    uint64_t seed;    /* of the reference; the renders' count up from there */
+    const char *what; /* said while it runs (work.h); NULL: nothing */
 };
 
 /* The caller frees. */

@@ -1,11 +1,11 @@
-/* make_anchors DIR WORK | --page DIR | --quick DIR WORK: what our gate and the rules of other renderers'
+/* make_anchors DIR | --page DIR | --quick DIR: what our gate and the rules of other renderers'
  * tests find on the same images. Writes DIR/results.json, README.md and plots; --page makes the last
- * two again; --quick measures two scenes with few pairs, to see that it runs. The images are kept in
- * WORK (900 MB). For `make anchors`. */
+ * two again; --quick measures two scenes with few pairs, to see that it runs. For `make
+ * anchors`. */
 #include "anchors.h"
 
+#include "tests/studies/calibration/work.h"
 #include "tests/support/rates.h"
-#include "renderer/base/progress.h"
 #include "renderer/base/version.h"
 #include "tools/compare/compare.h"
 #include "tools/exact/sign_flip.h"
@@ -16,9 +16,8 @@
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
-#include <unistd.h>
 
-/* What one thread judges with. */
+/* What one job judges with. */
 struct bench {
     struct moments a; /* the wrong image */
     double *z;
@@ -28,17 +27,17 @@ struct bench {
 };
 
 struct measurement {
+    const char *scene;
     const struct anchor_settings *set;
     struct anchor_pool pool;
     double threshold[NUM_ANCHOR_RULES];
     double guess[NUM_ANCHOR_RULES][NUM_ANCHOR_ERRORS];
-    bool *alarm;      /* num_pairs x NUM_ANCHOR_RULES */
-    double *smallest; /* num_pairs x NUM_ANCHOR_RULES x NUM_ANCHOR_ERRORS */
+    /* Of each pair: */
+    bool (*alarm)[NUM_ANCHOR_RULES];
+    double (*smallest)[NUM_ANCHOR_RULES][NUM_ANCHOR_ERRORS];
+    bool (*found)[NUM_ANCHOR_RULES][NUM_ANCHOR_ERRORS]; /* when asked again for `bias` */
     double bias[NUM_ANCHOR_RULES][NUM_ANCHOR_ERRORS];
-    bool *found; /* as `smallest`, of `bias` */
     double *tune[NUM_ANCHOR_RULES];
-    struct bench *bench; /* one a thread */
-    const char *stage;
 };
 
 enum { TUNE_PARTNERS = 3 }; /* renders for thresholds make so many pairs each, overlapping */
@@ -46,25 +45,46 @@ static const double smallest_tried = 1e-5, largest_tried = 100;
 
 static void die(const char *what, const struct err *e)
 {
-    fprintf(stderr, "\nmake_anchors: %s: %s\n", what, e->msg);
+    fprintf(stderr, "make_anchors: %s: %s\n", what, e->msg);
     exit(3);
 }
 
-static void show(const char *scene, const char *stage, double share)
+/* Jobs on all processors, with a line that says which and how far. */
+static void run_all(const struct measurement *m, const char *stage, int num, work_job *job,
+                    void *arg)
 {
-    static double last;
-    double now = now_seconds();
-    if (share < 1 && now - last < (isatty(STDERR_FILENO) ? 0.3 : 20))
-        return;
-    last = now;
-    fprintf(stderr, isatty(STDERR_FILENO) ? "\r%s: %s %3.0f %%   " : "%s: %s %.0f %%\n", scene,
-            stage, 100 * share);
+    char what[128];
+    struct err e;
+    snprintf(what, sizeof what, "%s: %s", m->scene, stage);
+    if (!work_run_all(what, num, job, arg, &e))
+        die(what, &e);
 }
 
-static const char *scene_shown;
-static void show_render(double share)
+static struct bench bench_open(int side)
 {
-    show(scene_shown, "rendering", share);
+    struct err e;
+    struct bench t = {.in_b8 = NULL};
+    size_t values = 3 * (size_t)side * (size_t)side;
+    if (!moments_alloc(&t.a, side, side, &e))
+        die("no memory", &e);
+    t.z = calloc(values, sizeof *t.z);
+    t.a8 = calloc(values, 1);
+    t.b8 = calloc(values, 1);
+    t.a32 = calloc(values, sizeof *t.a32);
+    t.b32 = calloc(values, sizeof *t.b32);
+    t.error = calloc(values, sizeof *t.error);
+    return t;
+}
+
+static void bench_close(struct bench *t)
+{
+    moments_free(&t->a);
+    free(t->z);
+    free(t->a8);
+    free(t->b8);
+    free(t->a32);
+    free(t->b32);
+    free(t->error);
 }
 
 /* -log10 of the smallest alpha at which the gate's p-values, got with `alpha`, are DIFFERENT. */
@@ -187,28 +207,29 @@ static bool one_sided(enum anchor_rule rule) /* judges A against the long refere
     return rule == RULE_MITSUBA_LEVEL_TUNED || rule == RULE_MITSUBA_SHARE_TUNED;
 }
 
-static void tune_one(void *arg, int i, int thread)
+static bool tune_one(void *arg, int i, struct err *e)
 {
+    (void)e;
     struct measurement *m = arg;
     int n = m->set->num_tune;
-    const struct moments *a = &m->pool.render[i];
+    struct bench t = bench_open(m->set->side);
     for (int r = 0; r < NUM_ANCHOR_RULES; r++)
         for (int k = 0; m->tune[r] != NULL && k < (one_sided(r) ? 1 : TUNE_PARTNERS); k++)
             m->tune[r][k * n + i] =
-                score(m, &m->bench[thread], r, a, &m->pool.render[(i + k + 1) % n]);
-    if (thread == 0)
-        show(scene_shown, "thresholds", (double)(i + 1) / n);
+                score(m, &t, r, &m->pool.render[i], &m->pool.render[(i + k + 1) % n]);
+    bench_close(&t);
+    return true;
 }
 
 /* The smallest score that at most the share `tuned` of the null scores exceeds. */
-static void set_thresholds(struct measurement *m, int threads)
+static void set_thresholds(struct measurement *m)
 {
     size_t pixels = (size_t)m->pool.side * (size_t)m->pool.side;
     int n = m->set->num_tune;
     for (int r = 0; r < NUM_ANCHOR_RULES; r++)
         if (!published_threshold(r, pixels, &m->threshold[r]))
             m->tune[r] = calloc((size_t)(n * TUNE_PARTNERS), sizeof(double));
-    anchor_parallel(n, threads, tune_one, m);
+    run_all(m, "thresholds", n, tune_one, m);
     for (int r = 0; r < NUM_ANCHOR_RULES; r++)
         if (m->tune[r] != NULL) {
             int scores = one_sided(r) ? n : n * TUNE_PARTNERS;
@@ -274,19 +295,18 @@ static double smallest_found(const struct measurement *m, struct bench *t, enum 
     return hi;
 }
 
-static void measure_pair(void *arg, int pair, int thread)
+static bool measure_pair(void *arg, int pair, struct err *e)
 {
+    (void)e;
     struct measurement *m = arg;
-    struct bench *t = &m->bench[thread];
+    struct bench t = bench_open(m->set->side);
     for (int r = 0; r < NUM_ANCHOR_RULES; r++) {
-        m->alarm[pair * NUM_ANCHOR_RULES + r] = excess(m, t, r, pair, ANCHOR_GLOBAL, 0) > 0;
-        for (int k = 0; k < NUM_ANCHOR_ERRORS; k++) {
-            double *out = &m->smallest[(pair * NUM_ANCHOR_RULES + r) * NUM_ANCHOR_ERRORS + k];
-            *out = smallest_found(m, t, r, pair, k, m->guess[r][k]);
-        }
+        m->alarm[pair][r] = excess(m, &t, r, pair, ANCHOR_GLOBAL, 0) > 0;
+        for (int k = 0; k < NUM_ANCHOR_ERRORS; k++)
+            m->smallest[pair][r][k] = smallest_found(m, &t, r, pair, k, m->guess[r][k]);
     }
-    if (thread == 0)
-        show(scene_shown, "judging", (double)(pair + 1) / m->set->num_pairs);
+    bench_close(&t);
+    return true;
 }
 
 struct question {
@@ -294,29 +314,32 @@ struct question {
     bool open[NUM_ANCHOR_RULES][NUM_ANCHOR_ERRORS]; /* asked this time */
 };
 
-static void ask_again(void *arg, int pair, int thread)
+static bool ask_again(void *arg, int pair, struct err *e)
 {
+    (void)e;
     const struct question *q = arg;
     struct measurement *m = q->m;
+    struct bench t = bench_open(m->set->side);
     for (int r = 0; r < NUM_ANCHOR_RULES; r++)
         for (int k = 0; k < NUM_ANCHOR_ERRORS; k++)
             if (q->open[r][k])
-                m->found[(pair * NUM_ANCHOR_RULES + r) * NUM_ANCHOR_ERRORS + k] =
-                    excess(m, &m->bench[thread], r, pair, k, m->bias[r][k]) > 0;
+                m->found[pair][r][k] = excess(m, &t, r, pair, k, m->bias[r][k]) > 0;
+    bench_close(&t);
+    return true;
 }
 
 static int times_found(const struct measurement *m, int rule, int kind)
 {
     int found = 0;
     for (int i = 0; i < m->set->num_pairs; i++)
-        found += m->found[(i * NUM_ANCHOR_RULES + rule) * NUM_ANCHOR_ERRORS + kind];
+        found += m->found[i][rule][kind];
     return found;
 }
 
 /* Is the bias really found with the power asked for? Not always: a rule may find a small error in a pair
  * and miss a larger one, as ours does where a larger error makes a region too skewed to be tested. Then
  * the bias is raised by 5 % at a time until it is. */
-static void confirm(struct measurement *m, int threads)
+static void confirm(struct measurement *m)
 {
     int enough = (int)ceil(m->set->power * m->set->num_pairs - 1e-9);
     struct question q = {.m = m};
@@ -325,7 +348,7 @@ static void confirm(struct measurement *m, int threads)
         for (int k = 0; k < NUM_ANCHOR_ERRORS; k++)
             q.open[r][k] = isfinite(m->bias[r][k]);
     while (any) {
-        anchor_parallel(m->set->num_pairs, threads, ask_again, &q);
+        run_all(m, "asking again", m->set->num_pairs, ask_again, &q);
         any = false;
         for (int r = 0; r < NUM_ANCHOR_RULES; r++)
             for (int k = 0; k < NUM_ANCHOR_ERRORS; k++) {
@@ -345,34 +368,34 @@ static void confirm(struct measurement *m, int threads)
 
 /* Pair 0 alone first: its answers are where the search starts in all others, so that the record does
  * not depend on which thread comes when. */
-static void measure_pairs(struct measurement *m, int threads, struct anchor_scene_result *out)
+static void measure_pairs(struct measurement *m, struct anchor_scene_result *out)
 {
     int n = m->set->num_pairs, at, lo, hi;
     for (int r = 0; r < NUM_ANCHOR_RULES; r++)
         for (int k = 0; k < NUM_ANCHOR_ERRORS; k++)
             m->guess[r][k] = 0.1;
-    measure_pair(m, 0, 0);
+    run_all(m, "the first pair", 1, measure_pair, m);
     for (int r = 0; r < NUM_ANCHOR_RULES; r++)
         for (int k = 0; k < NUM_ANCHOR_ERRORS; k++)
-            m->guess[r][k] = fmin(m->smallest[r * NUM_ANCHOR_ERRORS + k], largest_tried);
-    anchor_parallel(n, threads, measure_pair, m);
+            m->guess[r][k] = fmin(m->smallest[0][r][k], largest_tried);
+    run_all(m, "judging", n, measure_pair, m);
     anchors_quantile_ranks(n, m->set->power, &at, &lo, &hi);
     double *sorted = calloc((size_t)n, sizeof *sorted);
     for (int r = 0; r < NUM_ANCHOR_RULES; r++)
         for (int k = 0; k < NUM_ANCHOR_ERRORS; k++) {
             for (int i = 0; i < n; i++)
-                sorted[i] = m->smallest[(i * NUM_ANCHOR_RULES + r) * NUM_ANCHOR_ERRORS + k];
+                sorted[i] = m->smallest[i][r][k];
             sort_numbers(sorted, (size_t)n);
             m->bias[r][k] = sorted[at];
             out->rule[r].bias[k] = (struct anchor_bias){
                 .b = sorted[at], .lo = sorted[lo], .hi = hi < n ? sorted[hi] : INFINITY};
         }
     free(sorted);
-    confirm(m, threads);
+    confirm(m);
     for (int r = 0; r < NUM_ANCHOR_RULES; r++) {
         out->rule[r].threshold = m->threshold[r];
         for (int i = 0; i < n; i++)
-            out->rule[r].false_alarms += m->alarm[i * NUM_ANCHOR_RULES + r];
+            out->rule[r].false_alarms += m->alarm[i][r];
         for (int k = 0; k < NUM_ANCHOR_ERRORS; k++) {
             struct anchor_bias *bias = &out->rule[r].bias[k];
             bias->b = m->bias[r][k];
@@ -382,67 +405,40 @@ static void measure_pairs(struct measurement *m, int threads, struct anchor_scen
     }
 }
 
-static void measure_scene(const struct anchor_settings *set, int scene, const char *work,
-                          int threads, struct anchor_scene_result *out)
+static void measure_scene(const struct anchor_settings *set, int scene,
+                          struct anchor_scene_result *out)
 {
     struct err e = {""};
-    struct measurement m = {.set = set};
-    size_t values = 3 * (size_t)set->side * (size_t)set->side;
-    size_t cells = (size_t)set->num_pairs * NUM_ANCHOR_RULES;
-    scene_shown = anchor_scenes[scene];
-    char kept[4096];
-    snprintf(kept, sizeof kept, "%s/%s.renders", work, anchor_scenes[scene]);
-    const struct anchor_job job = {.scene = anchor_scenes[scene],
+    char what[128];
+    struct measurement m = {.set = set, .scene = anchor_scenes[scene]};
+    snprintf(what, sizeof what, "%s: rendering", m.scene);
+    const struct anchor_job job = {.scene = m.scene,
                                    .side = set->side,
                                    .spp = set->spp,
                                    .num_renders = set->num_tune + 2 * set->num_pairs,
                                    .reference_spp = set->reference_spp,
                                    .seed = set->seed + 100000 * (uint64_t)scene,
-                                   .threads = threads,
-                                   .kept = kept,
-                                   .progress = show_render};
+                                   .what = what};
     if (!anchor_render(&job, &m.pool, &e))
-        die(anchor_scenes[scene], &e);
-    m.alarm = calloc(cells, sizeof *m.alarm);
-    m.smallest = calloc(cells * NUM_ANCHOR_ERRORS, sizeof *m.smallest);
-    m.found = calloc(cells * NUM_ANCHOR_ERRORS, sizeof *m.found);
-    m.bench = calloc((size_t)threads, sizeof *m.bench);
-    for (int t = 0; t < threads; t++) {
-        if (!moments_alloc(&m.bench[t].a, set->side, set->side, &e))
-            die("no memory", &e);
-        m.bench[t].z = calloc(values, sizeof(double));
-        m.bench[t].a8 = calloc(values, 1);
-        m.bench[t].b8 = calloc(values, 1);
-        m.bench[t].a32 = calloc(values, sizeof(float));
-        m.bench[t].b32 = calloc(values, sizeof(float));
-        m.bench[t].error = calloc(values, sizeof(float));
-    }
-    snprintf(out->scene, sizeof out->scene, "%s", anchor_scenes[scene]);
+        die(m.scene, &e);
+    m.alarm = calloc((size_t)set->num_pairs, sizeof *m.alarm);
+    m.smallest = calloc((size_t)set->num_pairs, sizeof *m.smallest);
+    m.found = calloc((size_t)set->num_pairs, sizeof *m.found);
+    snprintf(out->scene, sizeof out->scene, "%s", m.scene);
     snprintf(out->title, sizeof out->title, "%s", m.pool.title);
     out->noise = anchor_noise(&m.pool);
     out->num_places = m.pool.num_places;
-    set_thresholds(&m, threads);
-    measure_pairs(&m, threads, out);
-    for (int t = 0; t < threads; t++) {
-        moments_free(&m.bench[t].a);
-        free(m.bench[t].z);
-        free(m.bench[t].a8);
-        free(m.bench[t].b8);
-        free(m.bench[t].a32);
-        free(m.bench[t].b32);
-        free(m.bench[t].error);
-    }
-    free(m.bench);
+    set_thresholds(&m);
+    measure_pairs(&m, out);
     free(m.alarm);
     free(m.smallest);
     free(m.found);
     anchor_pool_free(&m.pool);
 }
 
-static void measure(const struct anchor_settings *set, int num_scenes, const char *work,
-                    const char *path, struct anchor_results *out)
+static void measure(const struct anchor_settings *set, int num_scenes, const char *path,
+                    struct anchor_results *out)
 {
-    int threads = (int)fmin(16, fmax(1, (double)sysconf(_SC_NPROCESSORS_ONLN)));
     time_t now = time(NULL);
     struct tm day;
     *out = (struct anchor_results){.settings = *set};
@@ -450,12 +446,11 @@ static void measure(const struct anchor_settings *set, int num_scenes, const cha
     strftime(out->date, sizeof out->date, "%Y-%m-%d", gmtime_r(&now, &day));
     for (int s = 0; s < num_scenes; s++) {
         struct err e = {""};
-        measure_scene(set, s, work, threads, &out->scene[s]);
+        measure_scene(set, s, &out->scene[s]);
         out->num_scenes = s + 1; /* a record after each scene: the rest may be interrupted */
         if (!anchors_save(path, out, &e))
             die(path, &e);
     }
-    fputc('\n', stderr);
 }
 
 int main(int argc, char **argv)
@@ -464,12 +459,12 @@ int main(int argc, char **argv)
     struct err e = {""};
     char path[4096];
     bool page = argc == 3 && strcmp(argv[1], "--page") == 0;
-    bool quick = argc == 4 && strcmp(argv[1], "--quick") == 0;
-    if (r == NULL || (argc != 3 && !quick) || (!page && !quick && argv[1][0] == '-')) {
-        fputs("usage: make_anchors [--quick] DIRECTORY WORK | --page DIRECTORY\n", stderr);
+    bool quick = argc == 3 && strcmp(argv[1], "--quick") == 0;
+    if (r == NULL || (!page && !quick && (argc != 2 || argv[1][0] == '-'))) {
+        fputs("usage: make_anchors [--quick | --page] DIRECTORY\n", stderr);
         return 3;
     }
-    const char *dir = argv[page || quick ? 2 : 1], *work = argv[argc - 1];
+    const char *dir = argv[argc - 1];
     snprintf(path, sizeof path, "%s/results.json", dir);
     if (!page) {
         struct anchor_settings set = anchor_settings;
@@ -478,7 +473,7 @@ int main(int argc, char **argv)
             set.num_pairs = 20;
             set.reference_spp = 640;
         }
-        measure(&set, quick ? 2 : NUM_ANCHOR_SCENES, work, path, r);
+        measure(&set, quick ? 2 : NUM_ANCHOR_SCENES, path, r);
     }
     if (!anchors_load(path, r, &e) || !anchors_write_page(dir, r, &e))
         die(dir, &e);

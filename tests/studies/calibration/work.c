@@ -57,9 +57,12 @@ bool work_run(struct work *w, int num, double cost, work_job *job, void *arg, st
     return true;
 }
 
-bool work_run_all(int num, work_job *job, void *arg, struct err *e)
+bool work_run_all(const char *what, int num, work_job *job, void *arg, struct err *e)
 {
-    struct work w = {.threads = cli_processors() < MAX_THREADS ? cli_processors() : MAX_THREADS};
-    progress_start(&w.progress, "", NULL, true);
-    return work_run(&w, num, 0, job, arg, e);
+    struct work w = {.threads = cli_processors() < MAX_THREADS ? cli_processors() : MAX_THREADS,
+                     .total = num};
+    progress_start(&w.progress, what, NULL, what == NULL);
+    bool ok = work_run(&w, num, 1, job, arg, e);
+    progress_end(&w.progress, num);
+    return ok;
 }

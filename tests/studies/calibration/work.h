@@ -17,7 +17,7 @@ typedef bool work_job(void *arg, int job, struct err *e);
 /* Runs jobs 0 .. num-1, each about `cost` CPU milliseconds; false with the first error. */
 NODISCARD bool work_run(struct work *w, int num, double cost, work_job *job, void *arg,
                         struct err *e);
-/* The same on all processors, and silent. */
-NODISCARD bool work_run_all(int num, work_job *job, void *arg, struct err *e);
+/* The same on all processors; `what` is said with how far it is, NULL: nothing. */
+NODISCARD bool work_run_all(const char *what, int num, work_job *job, void *arg, struct err *e);
 
 #endif

@@ -315,7 +315,7 @@ static bool make(struct maker *m, const char *patches, struct err *e)
     struct err none;
     if (!catalogue_read(out, &m->old, &none))
         m->old = (struct catalogue){0};
-    return work_run_all(m->made.num_bugs, make_bug, m, e) && catalogue_write(out, &m->made, e);
+    return work_run_all(NULL, m->made.num_bugs, make_bug, m, e) && catalogue_write(out, &m->made, e);
 }
 
 /* That the directory of the catalogue is not there is a mistake: it is made before. */
