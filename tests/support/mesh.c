@@ -3,7 +3,6 @@
 #include "renderer/math/sampler.h"
 
 #include <stdlib.h>
-#include <string.h>
 
 static struct scene new_mesh(uint32_t triangles)
 {
@@ -113,38 +112,4 @@ struct scene mesh_twins(uint32_t n)
     }
     scene_free(&one);
     return s;
-}
-
-static uint32_t hash_of(const vec3 *p)
-{
-    uint32_t word[3], h = 0x811c9dc5u;
-    memcpy(word, p, sizeof word);
-    for (int i = 0; i < 3; i++)
-        h = (h ^ word[i]) * 0x01000193u ^ h >> 15;
-    return h * 0x9e3779b1u;
-}
-
-uint32_t mesh_share(const struct scene *s, vec3 **vertex, uint32_t **index)
-{
-    size_t corners = 3 * (size_t)s->num_triangles, slots = 1024;
-    while (slots < 2 * corners)
-        slots *= 2;
-    uint32_t *slot = calloc(slots, sizeof *slot), num = 0; /* vertex number + 1; 0: empty */
-    *vertex = malloc(corners * sizeof **vertex);
-    *index = malloc(corners * sizeof **index);
-    if (slot == NULL || *vertex == NULL || *index == NULL)
-        abort();
-    for (size_t i = 0; i < corners; i++) {
-        const vec3 *p = &s->position[i];
-        size_t at = hash_of(p) & (slots - 1);
-        while (slot[at] != 0 && memcmp(&(*vertex)[slot[at] - 1], p, sizeof *p) != 0)
-            at = (at + 1) & (slots - 1);
-        if (slot[at] == 0) {
-            (*vertex)[num] = *p;
-            slot[at] = ++num;
-        }
-        (*index)[i] = slot[at] - 1;
-    }
-    free(slot);
-    return num;
 }

@@ -19,8 +19,4 @@ struct scene mesh_needles(uint32_t n);
 /* Every triangle of a terrain twice, the second time with other corners first. */
 struct scene mesh_twins(uint32_t n);
 
-/* The distinct corners of all triangles, and which of them each corner is (3 a triangle); both for
- * free(). Corners are the same if their bits are. */
-uint32_t mesh_share(const struct scene *s, vec3 **vertex, uint32_t **index);
-
 #endif

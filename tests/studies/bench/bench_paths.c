@@ -9,7 +9,7 @@
 #include "bench_engines.h"
 #include "bench_scenes.h"
 #include "bench_timing.h"
-#include "tests/studies/calibration/calibrate_plot.h"
+#include "drawing.h"
 
 #include "reference/base/process.h"
 #include "renderer/base/fs.h"

@@ -3,7 +3,7 @@
 #include "bench.h"
 #include "bench_timing.h"
 #include "bench_tracers.h"
-#include "tests/studies/calibration/calibrate_plot.h"
+#include "drawing.h"
 #include "tests/support/mesh.h"
 
 #include "renderer/transport/render.h"

@@ -34,7 +34,7 @@ const char *bench_scene_name(int i)
     return table[i].name;
 }
 
-/* A bumpy ball of about n triangles in a box without a front (tests/studies/bench/make_mesh.c). */
+/* A bumpy ball of about n triangles in a box without a front. */
 static struct scene ball_in_box(uint32_t n)
 {
     static const float corner[8][3] = {{-1, -0.75f, -1}, {1, -0.75f, -1}, {1, 0.75f, -1},

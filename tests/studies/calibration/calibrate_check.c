@@ -9,47 +9,43 @@
 
 const double check_tail = 0.0005;
 
-static bool add(struct checks *c, bool holds, const char *fmt, va_list args)
+static void add(struct checks *c, bool holds, const char *fmt, va_list args)
 {
     assert(c->num < MAX_CHECKS);
     struct check *item = &c->item[c->num++];
     vsnprintf(item->what, sizeof item->what, fmt, args);
     item->holds = holds;
     c->failed += !holds;
-    return holds;
 }
 
-static bool add_rate(struct checks *c, bool holds, double k, double n, const char *fmt,
+static void add_rate(struct checks *c, bool holds, double k, double n, const char *fmt,
                      va_list args)
 {
     add(c, holds, fmt, args);
     char *what = c->item[c->num - 1].what;
     size_t length = strlen(what);
     snprintf(what + length, sizeof c->item->what - length, ": %.0f of %.0f", k, n);
-    return holds;
 }
 
 #define RATE_CHECK(name, condition)                                                                \
-    bool name(struct checks *c, double k, double n, double rate, const char *fmt, ...)             \
+    void name(struct checks *c, double k, double n, double rate, const char *fmt, ...)             \
     {                                                                                              \
         va_list args;                                                                              \
         va_start(args, fmt);                                                                       \
-        bool holds = add_rate(c, condition, k, n, fmt, args);                                      \
+        add_rate(c, condition, k, n, fmt, args);                                                   \
         va_end(args);                                                                              \
-        return holds;                                                                              \
     }
 RATE_CHECK(check_at_most, rate_lower(k, n, check_tail) <= rate)
 RATE_CHECK(check_at_least, rate_upper(k, n, check_tail) >= rate)
 RATE_CHECK(check_proves_at_most, rate_upper(k, n, check_tail) <= rate)
 RATE_CHECK(check_proves_at_least, rate_lower(k, n, check_tail) >= rate)
 
-bool check_that(struct checks *c, bool holds, const char *fmt, ...)
+void check_that(struct checks *c, bool holds, const char *fmt, ...)
 {
     va_list args;
     va_start(args, fmt);
     add(c, holds, fmt, args);
     va_end(args);
-    return holds;
 }
 
 const char *checks_word(const struct checks *c, int from)

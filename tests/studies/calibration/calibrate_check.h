@@ -21,17 +21,17 @@ struct checks {
 /* Of one tail: the interval of 99.9 % has two. */
 extern const double check_tail;
 
-/* Each adds a line and says whether it holds. k of n, n > 0. */
-bool check_at_most(struct checks *c, double k, double n, double rate, const char *fmt, ...)
+/* Each adds a line. k of n, n > 0. */
+void check_at_most(struct checks *c, double k, double n, double rate, const char *fmt, ...)
     __attribute__((format(printf, 5, 6)));
-bool check_at_least(struct checks *c, double k, double n, double rate, const char *fmt, ...)
+void check_at_least(struct checks *c, double k, double n, double rate, const char *fmt, ...)
     __attribute__((format(printf, 5, 6)));
-bool check_proves_at_most(struct checks *c, double k, double n, double rate, const char *fmt, ...)
+void check_proves_at_most(struct checks *c, double k, double n, double rate, const char *fmt, ...)
     __attribute__((format(printf, 5, 6)));
-bool check_proves_at_least(struct checks *c, double k, double n, double rate, const char *fmt, ...)
+void check_proves_at_least(struct checks *c, double k, double n, double rate, const char *fmt, ...)
     __attribute__((format(printf, 5, 6)));
 /* Any other condition. */
-bool check_that(struct checks *c, bool holds, const char *fmt, ...)
+void check_that(struct checks *c, bool holds, const char *fmt, ...)
     __attribute__((format(printf, 3, 4)));
 
 /* "holds" or "**does not hold**", of the lines from number `from` on. */

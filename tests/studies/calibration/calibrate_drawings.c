@@ -1,6 +1,6 @@
 #include "calibrate.h"
 
-#include "calibrate_plot.h"
+#include "tests/studies/bench/drawing.h"
 #include "tests/support/rates.h"
 
 #include <math.h>

@@ -6,19 +6,16 @@
 #include "tools/exact/permutation.h"
 #include "tools/exact/sign_flip.h"
 
-enum { SIDE = 16, TILE = 8, RENEWED = 128, CHUNK = 500, REPLICATES = 6, PERMUTED_SIDE = 8 };
+#include <string.h>
+
+enum { SIDE = 16, TILE = 8, RENEWED = 128, EACH = 500, REPLICATES = 6, PERMUTED_SIDE = 8 };
 const double permutation_level[2][NUM_PERMUTATION_LEVELS] = {{0.1, 0.05, 0.01}, {1e-2, 1e-3, 1e-4}};
 
-struct gate_job {
-    const struct stages_cell *stages;
-    const struct permutation_cell *permutation; /* one of both */
-    size_t pairs, blocks;
-    double (*count)[NUM_PERMUTATION_LEVELS]; /* one a chunk; stages: flagged, different */
-};
-
-static bool stages_pair(const struct stages_cell *cell, struct library *l, bool is_grey,
-                        struct moments *a, struct moments *b, double *count, struct err *e)
+static bool stages_pair(void *arg, struct library *l, size_t i, struct moments *a,
+                        struct moments *b, double count[PAIR_COUNTS], struct err *e)
 {
+    const struct stages_cell *cell = arg;
+    bool is_grey = i % 2 == 0;
     struct compare_options opt = {.alpha = cell->alpha, .tile = TILE};
     struct comparison first, second;
     library_renew(l, RENEWED);
@@ -41,25 +38,6 @@ static bool stages_pair(const struct stages_cell *cell, struct library *l, bool 
     return ok;
 }
 
-static bool stages_chunk(void *arg, int chunk, struct err *e)
-{
-    struct gate_job *job = arg;
-    const struct stages_cell *cell = job->stages;
-    uint64_t seed = (cell->seed << 20) + 1000003u * (uint64_t)(chunk + 1);
-    struct library library;
-    if (!library_init(&library, cell->law, cell->n < 64 ? cell->n : 64, job->blocks, seed, e))
-        return false;
-    struct moments a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
-    bool ok = true;
-    size_t end = (size_t)(chunk + 1) * CHUNK;
-    for (size_t i = (size_t)chunk * CHUNK; ok && i < end && i < job->pairs; i++)
-        ok = stages_pair(cell, &library, i % 2 == 0, &a, &b, job->count[chunk], e);
-    moments_free(&a);
-    moments_free(&b);
-    library_free(&library);
-    return ok;
-}
-
 /* Never all black, which two images could both be: the same image twice is refused. */
 static void draw_image(enum law law, uint64_t *state, float *pixels)
 {
@@ -73,10 +51,11 @@ static void draw_image(enum law law, uint64_t *state, float *pixels)
         }
 }
 
-static bool permutation_chunk(void *arg, int chunk, struct err *e)
+static bool permutation_part(void *arg, int part, size_t first, size_t end,
+                             double count[PAIR_COUNTS], struct err *e)
 {
-    struct gate_job *job = arg;
-    uint64_t state = (job->permutation->seed << 20) + 1000003u * (uint64_t)(chunk + 1);
+    const struct permutation_cell *cell = arg;
+    uint64_t state = pairs_seed(cell->seed, part);
     float pixels[2 * REPLICATES][3 * PERMUTED_SIDE * PERMUTED_SIDE];
     float *image[2 * REPLICATES];
     char name[2 * REPLICATES][16], *names[2 * REPLICATES];
@@ -89,15 +68,14 @@ static bool permutation_chunk(void *arg, int chunk, struct err *e)
     struct replicate_dir b = {REPLICATES, PERMUTED_SIDE, PERMUTED_SIDE, image + REPLICATES,
                               names + REPLICATES};
     struct permutation_options opt = {.alpha = permutation_level[0][0], .min_side = 2};
-    size_t end = (size_t)(chunk + 1) * CHUNK;
-    for (size_t i = (size_t)chunk * CHUNK; i < end && i < job->pairs; i++) {
+    for (size_t i = first; i < end; i++) {
         struct permutation p;
         for (int k = 0; k < 2 * REPLICATES; k++)
-            draw_image(job->permutation->law, &state, pixels[k]);
+            draw_image(cell->law, &state, pixels[k]);
         if (!permutation_test(&a, &b, &opt, &p, e))
             return false;
         for (int l = 0; l < NUM_PERMUTATION_LEVELS; l++)
-            job->count[chunk][l] += p.p <= permutation_level[0][l];
+            count[l] += p.p <= permutation_level[0][l];
     }
     return true;
 }
@@ -113,48 +91,31 @@ static void draw_means(enum law law, int draws, uint64_t *state, float *pixels)
     }
 }
 
-static bool flips_chunk(void *arg, int chunk, struct err *e)
+static bool flips_part(void *arg, int part, size_t first, size_t end, double count[PAIR_COUNTS],
+                       struct err *e)
 {
-    struct gate_job *job = arg;
-    const struct permutation_cell *cell = job->permutation;
-    uint64_t state = (cell->seed << 20) + 1000003u * (uint64_t)(chunk + 1);
+    const struct permutation_cell *cell = arg;
+    uint64_t state = pairs_seed(cell->seed, part);
     float a[3 * SIDE * SIDE], b[3 * SIDE * SIDE];
     float *rows[] = {a, b};
     struct sign_flip_images in = {1, SIDE, SIDE, &rows[0], &rows[1], NULL};
     struct sign_flip_options opt = {
         .alpha = permutation_level[1][0], .filter_width = 1, .tile = TILE};
-    size_t end = (size_t)(chunk + 1) * CHUNK;
-    for (size_t i = (size_t)chunk * CHUNK; i < end && i < job->pairs; i++) {
+    for (size_t i = first; i < end; i++) {
         struct sign_flip f;
         draw_means(cell->law, cell->draws, &state, a);
         draw_means(cell->law, cell->draws, &state, b);
         if (!sign_flip_test(&in, &opt, &f, e))
             return false;
         for (int l = 0; l < NUM_PERMUTATION_LEVELS; l++)
-            job->count[chunk][l] += f.log10_p <= log10(permutation_level[1][l]);
+            count[l] += f.log10_p <= log10(permutation_level[1][l]);
     }
     return true;
 }
 
-/* Runs all chunks and adds what they counted. */
-static bool run_chunks(struct work *w, struct gate_job *job, double cost, work_job *chunk,
-                       double count[NUM_PERMUTATION_LEVELS], struct err *e)
-{
-    int chunks = (int)((job->pairs + CHUNK - 1) / CHUNK);
-    job->count = calloc((size_t)chunks, sizeof *job->count);
-    if (job->count == NULL)
-        return err_set(e, "out of memory for %d parts", chunks);
-    bool ok = work_run(w, chunks, cost / chunks, chunk, job, e);
-    for (int i = 0; i < chunks; i++)
-        for (int l = 0; l < NUM_PERMUTATION_LEVELS; l++)
-            count[l] += job->count[i][l];
-    free(job->count);
-    return ok;
-}
-
 double stages_cost(const struct stages_cell *cell, size_t pairs)
 {
-    return (double)pairs * (1 + RENEWED * 15e-6 * (cell->n < 64 ? cell->n : 64));
+    return (double)pairs * (1 + RENEWED * 15e-6 * pairs_block(cell->n));
 }
 
 bool stages_run(struct work *w, const struct stages_cell *cell, size_t pairs, size_t blocks,
@@ -163,22 +124,26 @@ bool stages_run(struct work *w, const struct stages_cell *cell, size_t pairs, si
     *out = (struct stages_result){.alpha = cell->alpha, .pairs = (double)pairs};
     struct synthetic_cell named = {cell->law, cell->n, cell->n, 0};
     synthetic_name(&named, out->name, sizeof out->name);
-    struct gate_job job = {.stages = cell, .pairs = pairs, .blocks = blocks};
-    double count[NUM_PERMUTATION_LEVELS] = {0};
-    if (!run_chunks(w, &job, stages_cost(cell, pairs), stages_chunk, count, e))
+    const struct synthetic_pairs of = {.law = cell->law,
+                                       .n = cell->n,
+                                       .side = SIDE,
+                                       .blocks = blocks,
+                                       .seed = cell->seed,
+                                       .pair = stages_pair,
+                                       .arg = (void *)cell};
+    double count[PAIR_COUNTS];
+    if (!synthetic_pairs_run(w, &of, pairs, EACH, stages_cost(cell, pairs), count, e))
         return err_prefix(e, "two stages, %s", out->name);
     out->flagged = count[0];
     out->different = count[1];
     return true;
 }
 
-bool stages_check(const struct stages_result *r, struct checks *c)
+void stages_check(const struct stages_result *r, struct checks *c)
 {
-    bool flagged = check_at_most(c, r->flagged, r->pairs, two_stage_alpha(r->alpha),
-                                 "%s: flagged by the first of two stages at %g", r->name, r->alpha);
-    return check_at_most(c, r->different, r->pairs, r->alpha, "%s: two stages at %g", r->name,
-                         r->alpha) &&
-           flagged;
+    check_at_most(c, r->flagged, r->pairs, two_stage_alpha(r->alpha),
+                  "%s: flagged by the first of two stages at %g", r->name, r->alpha);
+    check_at_most(c, r->different, r->pairs, r->alpha, "%s: two stages at %g", r->name, r->alpha);
 }
 
 double permutations_cost(size_t pairs)
@@ -193,20 +158,18 @@ bool permutations_run(struct work *w, const struct permutation_cell *cell, size_
     snprintf(out->name, sizeof out->name, "%s", law_name[cell->law]);
     if (out->is_flips)
         snprintf(out->name, sizeof out->name, "%s, %d", law_name[cell->law], cell->draws);
-    struct gate_job job = {.permutation = cell, .pairs = pairs};
-    if (!run_chunks(w, &job, permutations_cost(pairs),
-                    out->is_flips ? flips_chunk : permutation_chunk, out->rejected, e))
+    double count[PAIR_COUNTS];
+    if (!pairs_run(w, pairs, EACH, permutations_cost(pairs),
+                   out->is_flips ? flips_part : permutation_part, (void *)cell, count, e))
         return err_prefix(e, "%s, %s", out->is_flips ? "flips" : "permutation", out->name);
+    memcpy(out->rejected, count, sizeof out->rejected);
     return true;
 }
 
-bool permutations_check(const struct permutation_result *r, struct checks *c)
+void permutations_check(const struct permutation_result *r, struct checks *c)
 {
-    bool holds = true;
     for (int l = 0; l < NUM_PERMUTATION_LEVELS; l++)
-        holds = check_at_most(c, r->rejected[l], r->pairs, permutation_level[r->is_flips][l],
-                              "%s: %s at %g", r->name, r->is_flips ? "flips" : "permutation",
-                              permutation_level[r->is_flips][l]) &&
-                holds;
-    return holds;
+        check_at_most(c, r->rejected[l], r->pairs, permutation_level[r->is_flips][l],
+                      "%s: %s at %g", r->name, r->is_flips ? "flips" : "permutation",
+                      permutation_level[r->is_flips][l]);
 }

@@ -4,8 +4,7 @@
 #define ASSAY_CALIBRATE_GATE_H
 
 #include "calibrate_check.h"
-#include "work.h"
-#include "tests/support/synthetic_images.h"
+#include "calibrate_pairs.h"
 
 #include <stddef.h>
 
@@ -25,7 +24,7 @@ NODISCARD bool stages_run(struct work *w, const struct stages_cell *cell, size_t
                           size_t blocks, struct stages_result *out, struct err *e);
 double stages_cost(const struct stages_cell *cell, size_t pairs);
 /* Flagged with at most the root of alpha, DIFFERENT with at most alpha. */
-bool stages_check(const struct stages_result *r, struct checks *c);
+void stages_check(const struct stages_result *r, struct checks *c);
 
 /* 6 replicates of 8 x 8 grey pixels on each side, each pixel one draw of the law; regions from 2 x 2
  * pixels up. The smallest p is 2/924. */
@@ -46,6 +45,6 @@ struct permutation_result {
 NODISCARD bool permutations_run(struct work *w, const struct permutation_cell *cell, size_t pairs,
                                 struct permutation_result *out, struct err *e);
 double permutations_cost(size_t pairs);
-bool permutations_check(const struct permutation_result *r, struct checks *c);
+void permutations_check(const struct permutation_result *r, struct checks *c);
 
 #endif

@@ -5,8 +5,7 @@
 
 #include "calibrate_check.h"
 #include "calibrate_tester.h"
-#include "work.h"
-#include "tests/support/synthetic_images.h"
+#include "calibrate_pairs.h"
 
 #include <stddef.h>
 
@@ -39,7 +38,7 @@ double power_95(const struct power_result *r);
 /* A bias of the MDB is found in at least 95 %; 1.1 of it is proved to be and 0.9 of it not to be, so
  * that the bias found with 95 % is within 10 % of the MDB. Colour: the last is not asked, as the MDB
  * is an upper bound where the channels are independent. */
-bool power_check(const struct power_result *r, struct checks *c);
+void power_check(const struct power_result *r, struct checks *c);
 
 /* Images of 16 x 16 pixels, tiles of 8. Coverage: all equal; the first tile's noise is ten times that
  * of the others, so that its interval reaches furthest and is the one printed. */
@@ -58,7 +57,7 @@ NODISCARD bool cover_run(struct work *w, const struct cover_cell *cell, enum wea
                          size_t pairs, size_t blocks, struct cover_result *out, struct err *e);
 double cover_cost(const struct cover_cell *cell, size_t pairs);
 /* Neither misses more often than 2 alpha. */
-bool cover_check(const struct cover_result *r, struct checks *c);
+void cover_check(const struct cover_result *r, struct checks *c);
 
 /* EQUIVALENT, bias just outside the margin: of the image, or of one tile. */
 struct margin_cell {
@@ -76,6 +75,6 @@ struct margin_result {
 NODISCARD bool margin_run(struct work *w, const struct margin_cell *cell, enum weakness weakness,
                           size_t pairs, size_t blocks, struct margin_result *out, struct err *e);
 double margin_cost(const struct margin_cell *cell, size_t pairs);
-bool margin_check(const struct margin_result *r, struct checks *c);
+void margin_check(const struct margin_result *r, struct checks *c);
 
 #endif

@@ -6,12 +6,11 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-enum { CHUNK = 10, TILE = 8 };
+enum { EACH = 10, TILE = 8 };
 
 struct render_job {
     const struct render_cell *cell;
     struct null_run run;
-    size_t pairs;
     struct scene scene;
     struct camera camera;
     struct bvh *bvh;
@@ -65,14 +64,16 @@ static bool replicates(const struct render_job *job, uint64_t seed, struct momen
     return ok;
 }
 
-static bool render_chunk(void *arg, int chunk, struct err *e)
+static bool render_part(void *arg, int part, size_t first, size_t end, double count[PAIR_COUNTS],
+                        struct err *e)
 {
+    (void)part;
+    (void)count;
     struct render_job *job = arg;
     const struct render_cell *cell = job->cell;
     uint64_t per_pair = 1 + (cell->replicates > 0 ? (uint64_t)cell->replicates : 1);
     bool ok = true;
-    size_t end = (size_t)(chunk + 1) * CHUNK;
-    for (size_t i = (size_t)chunk * CHUNK; ok && i < end && i < job->pairs; i++) {
+    for (size_t i = first; ok && i < end; i++) {
         uint64_t seed = (cell->seed << 32) + i * per_pair;
         struct moments a = {0}, b = {0};
         if (!image(job, seed, &a, e))
@@ -116,7 +117,8 @@ static bool open_scene(struct render_job *job, const char *scenes, struct err *e
 bool render_run(struct work *w, const char *scenes, const struct render_cell *cell,
                 enum weakness weakness, size_t pairs, struct null_result *out, struct err *e)
 {
-    struct render_job job = {.cell = cell, .pairs = pairs};
+    struct render_job job = {.cell = cell};
+    double count[PAIR_COUNTS];
     char name[64];
     const size_t all[NUM_LEVELS] = {pairs, pairs, pairs};
     if (cell->replicates > 0)
@@ -127,9 +129,8 @@ bool render_run(struct work *w, const char *scenes, const struct render_cell *ce
                  cell->spp, cell->spp);
     if (!open_scene(&job, scenes, e))
         return false;
-    int chunks = (int)((pairs + CHUNK - 1) / CHUNK);
     bool ok = null_init(&job.run, weakness, all, e) &&
-              work_run(w, chunks, render_cost(cell, pairs) / chunks, render_chunk, &job, e) &&
+              pairs_run(w, pairs, EACH, render_cost(cell, pairs), render_part, &job, count, e) &&
               null_summary(&job.run, name, false, out, e);
     null_free(&job.run);
     bvh_free(job.bvh);

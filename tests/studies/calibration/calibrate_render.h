@@ -4,7 +4,7 @@
 #define ASSAY_CALIBRATE_RENDER_H
 
 #include "calibrate_null.h"
-#include "work.h"
+#include "calibrate_pairs.h"
 
 struct render_cell {
     const char *scene; /* of the suite */

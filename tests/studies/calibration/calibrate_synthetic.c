@@ -5,8 +5,14 @@
 
 #include <string.h>
 
-enum { SIDE = 16, TILE = 8, CHUNK = 5000, RENEWED = 128, REGION_PIXELS = 64 };
-static const size_t tail_chunk = 1000000;
+enum {
+    SIDE = 16,
+    TILE = 8,
+    EACH = 5000,
+    REGIONS_EACH = 1000000,
+    RENEWED = 128,
+    REGION_PIXELS = 64
+};
 const double tail_level[3] = {1e-4, 1e-5, 1e-6};
 static const double guard_factor = 1.2214; /* e^0.2 */
 const char *const law_name[] = {
@@ -24,16 +30,10 @@ void synthetic_name(const struct synthetic_cell *cell, char *text, size_t size)
         snprintf(text, size, "%s, %d and exact", law_name[cell->law], cell->n_a);
 }
 
-/* Large n are sums of blocks of 64. */
-static int block_of(const struct synthetic_cell *cell)
+/* Seeds of parts must not be near each other: splitmix64 counts up. */
+static uint64_t seed_of(uint64_t seed, int part)
 {
-    return cell->n_a < 64 ? cell->n_a : 64;
-}
-
-/* Seeds of chunks must not be near each other: splitmix64 counts up. */
-static uint64_t seed_of(const struct synthetic_cell *cell, int chunk)
-{
-    uint64_t state = cell->seed * 0x632be59bd9b4e019u + (uint64_t)chunk;
+    uint64_t state = seed * 0x632be59bd9b4e019u + (uint64_t)part;
     for (int i = 0; i < 4; i++)
         state ^= (uint64_t)(uniform(&state) * 0x1p53) << (i * 3);
     return state;
@@ -42,35 +42,22 @@ static uint64_t seed_of(const struct synthetic_cell *cell, int chunk)
 struct synthetic_job {
     const struct synthetic_cell *cell;
     struct null_run run;
-    size_t blocks, largest;
 };
 
-static bool synthetic_chunk(void *arg, int chunk, struct err *e)
+static bool synthetic_pair(void *arg, struct library *l, size_t i, struct moments *a,
+                           struct moments *b, double count[PAIR_COUNTS], struct err *e)
 {
+    (void)count;
     struct synthetic_job *job = arg;
     const struct synthetic_cell *cell = job->cell;
-    struct library library;
-    int block = block_of(cell);
-    if (!library_init(&library, cell->law, block, job->blocks, seed_of(cell, chunk), e))
-        return false;
-    struct moments a = new_moments(SIDE, SIDE, "sample");
-    struct moments b = new_moments(SIDE, SIDE, cell->n_b > 0 ? "sample" : "exact");
-    bool ok = true;
-    size_t first = (size_t)chunk * CHUNK, end = first + CHUNK;
-    for (size_t i = first; ok && i < end && i < job->largest; i++) {
-        bool grey = i % 2 == 0;
-        library_renew(&library, RENEWED);
-        library_image(&library, cell->n_a / block, grey, NULL, &a);
-        if (cell->n_b > 0)
-            library_image(&library, cell->n_b / block, grey, &a, &b);
-        else
-            constant(&b, library_mean(&library), 1);
-        ok = null_pair(&job->run, i, &a, &b, TILE, e);
-    }
-    moments_free(&a);
-    moments_free(&b);
-    library_free(&library);
-    return ok;
+    bool grey = i % 2 == 0;
+    library_renew(l, RENEWED);
+    library_image(l, cell->n_a / l->n, grey, NULL, a);
+    if (cell->n_b > 0)
+        library_image(l, cell->n_b / l->n, grey, a, b);
+    else
+        constant(b, library_mean(l), 1);
+    return null_pair(&job->run, i, a, b, TILE, e);
 }
 
 static size_t largest_of(const size_t pairs[NUM_LEVELS])
@@ -86,7 +73,7 @@ double synthetic_cost(const struct synthetic_cell *cell, const size_t pairs[NUM_
     double runs = 0;
     for (int l = 0; l < NUM_LEVELS; l++)
         runs += (double)pairs[l];
-    return 0.45 * runs + (double)largest_of(pairs) * RENEWED * block_of(cell) * 15e-6;
+    return 0.45 * runs + (double)largest_of(pairs) * RENEWED * pairs_block(cell->n_a) * 15e-6;
 }
 
 bool synthetic_run(struct work *w, const struct synthetic_cell *cell, enum weakness weakness,
@@ -95,12 +82,22 @@ bool synthetic_run(struct work *w, const struct synthetic_cell *cell, enum weakn
 {
     char name[64];
     synthetic_name(cell, name, sizeof name);
-    struct synthetic_job job = {.cell = cell, .blocks = blocks, .largest = largest_of(pairs)};
+    struct synthetic_job job = {.cell = cell};
     if (!null_init(&job.run, weakness, pairs, e))
         return false;
-    int chunks = (int)((job.largest + CHUNK - 1) / CHUNK);
+    const struct synthetic_pairs of = {.law = cell->law,
+                                       .n = cell->n_a,
+                                       .side = SIDE,
+                                       .is_exact = cell->n_b == 0,
+                                       .blocks = blocks,
+                                       .seed = cell->seed,
+                                       .seed_of = seed_of,
+                                       .pair = synthetic_pair,
+                                       .arg = &job};
+    double count[PAIR_COUNTS];
     bool exact = cell->law == LAW_NORMAL && cell->n_b == cell->n_a;
-    bool ok = work_run(w, chunks, synthetic_cost(cell, pairs) / chunks, synthetic_chunk, &job, e) &&
+    bool ok = synthetic_pairs_run(w, &of, largest_of(pairs), EACH, synthetic_cost(cell, pairs),
+                                  count, e) &&
               null_summary(&job.run, name, exact, out, e);
     null_free(&job.run);
     return ok || err_prefix(e, "%s", name);
@@ -108,8 +105,7 @@ bool synthetic_run(struct work *w, const struct synthetic_cell *cell, enum weakn
 
 struct tail_job {
     const struct synthetic_cell *cell;
-    size_t blocks, regions;
-    struct tail_result *part; /* one a chunk */
+    size_t blocks;
 };
 
 /* A pixel of a region, straight from a library: whole images for every region would take hours. */
@@ -128,14 +124,15 @@ static struct estimate pick_pixel(struct library *l, int merge)
     return pyramid_estimate_from(1 + shift, v, k3, n);
 }
 
-static bool tail_chunk_run(void *arg, int chunk, struct err *e)
+/* Counts regions that are tested, and those rejected at each level. */
+static bool tail_part(void *arg, int part, size_t first, size_t end, double count[PAIR_COUNTS],
+                      struct err *e)
 {
-    struct tail_job *job = arg;
+    const struct tail_job *job = arg;
     const struct synthetic_cell *cell = job->cell;
-    struct tail_result *out = &job->part[chunk];
     struct library library;
-    int block = block_of(cell);
-    if (!library_init(&library, cell->law, block, job->blocks, seed_of(cell, chunk), e))
+    int block = pairs_block(cell->n_a);
+    if (!library_init(&library, cell->law, block, job->blocks, seed_of(cell->seed, part), e))
         return false;
     double guard = stats_normal_quantile(tail_level[2] / 2);
     struct judge judge = {.opt = {.alpha = tail_level[2], .tile = 8},
@@ -145,11 +142,9 @@ static bool tail_chunk_run(void *arg, int chunk, struct err *e)
                           .n_min = cell->n_a,
                           .z_guard = {[STATISTIC_PYRAMID] = guard}};
     struct rect rect = {0, 0, 8, 8};
-    size_t first = (size_t)chunk * tail_chunk;
-    size_t regions = job->regions - first < tail_chunk ? job->regions - first : tail_chunk;
     /* Below this |t| no p is small: no need to know it. */
     double least = 0.9 * stats_normal_quantile(tail_level[0] / 2);
-    for (size_t i = 0; i < regions; i++) {
+    for (size_t i = first; i < end; i++) {
         struct cell sum = {0};
         library_renew(&library, 1);
         for (int p = 0; p < REGION_PIXELS; p++) {
@@ -162,50 +157,40 @@ static bool tail_chunk_run(void *arg, int chunk, struct err *e)
         struct measured m = region_measure(&judge, &sum, rect);
         if (m.noise_free || !region_testable(&judge, &m))
             continue;
-        out->tested++;
+        count[0]++;
         if (region_excess_t(&m) < least)
             continue;
         double log10_p = region_log10_p(&judge, &m, 0);
         for (int l = 0; l < 3; l++)
-            out->rejected[l] += log10_p <= log10(tail_level[l]);
+            count[1 + l] += log10_p <= log10(tail_level[l]);
     }
-    out->regions = (double)regions;
     library_free(&library);
     return true;
 }
 
 double tail_cost(const struct synthetic_cell *cell, size_t regions)
 {
-    double merge = (cell->n_a + cell->n_b) / block_of(cell);
-    return (double)regions * (64 * merge * 10e-6 + block_of(cell) * 15e-6);
+    double merge = (cell->n_a + cell->n_b) / pairs_block(cell->n_a);
+    return (double)regions * (64 * merge * 10e-6 + pairs_block(cell->n_a) * 15e-6);
 }
 
 bool tail_run(struct work *w, const struct synthetic_cell *cell, size_t regions, size_t blocks,
               struct tail_result *out, struct err *e)
 {
-    *out = (struct tail_result){0};
+    *out = (struct tail_result){.regions = (double)regions};
     synthetic_name(cell, out->name, sizeof out->name);
-    int chunks = (int)((regions + tail_chunk - 1) / tail_chunk);
-    struct tail_job job = {cell, blocks, regions, calloc((size_t)chunks, sizeof *job.part)};
-    if (job.part == NULL)
-        return err_set(e, "out of memory for %d parts", chunks);
-    bool ok = work_run(w, chunks, tail_cost(cell, regions) / chunks, tail_chunk_run, &job, e);
-    for (int i = 0; ok && i < chunks; i++) {
-        out->regions += job.part[i].regions;
-        out->tested += job.part[i].tested;
-        for (int l = 0; l < 3; l++)
-            out->rejected[l] += job.part[i].rejected[l];
-    }
-    free(job.part);
-    return ok || err_prefix(e, "%s", out->name);
+    struct tail_job job = {cell, blocks};
+    double count[PAIR_COUNTS];
+    if (!pairs_run(w, regions, REGIONS_EACH, tail_cost(cell, regions), tail_part, &job, count, e))
+        return err_prefix(e, "%s", out->name);
+    out->tested = count[0];
+    memcpy(out->rejected, count + 1, sizeof out->rejected);
+    return true;
 }
 
-bool tail_check(const struct tail_result *r, struct checks *c)
+void tail_check(const struct tail_result *r, struct checks *c)
 {
-    bool holds = true;
     for (int l = 0; l < 3; l++)
-        holds = check_at_most(c, r->rejected[l], fmax(1, r->tested), tail_level[l] * guard_factor,
-                              "%s: single regions at %g", r->name, tail_level[l]) &&
-                holds;
-    return holds;
+        check_at_most(c, r->rejected[l], fmax(1, r->tested), tail_level[l] * guard_factor,
+                      "%s: single regions at %g", r->name, tail_level[l]);
 }

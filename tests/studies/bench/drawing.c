@@ -1,4 +1,4 @@
-#include "calibrate_plot.h"
+#include "drawing.h"
 
 #include "renderer/base/fs.h"
 

@@ -1,7 +1,7 @@
 /* The drawings of studies: lines with error bars, as an SVG file of its own that is readable on light and on dark
  * ground. */
-#ifndef ASSAY_CALIBRATE_PLOT_H
-#define ASSAY_CALIBRATE_PLOT_H
+#ifndef ASSAY_DRAWING_H
+#define ASSAY_DRAWING_H
 
 #include "renderer/base/err.h"
 #include "tools/plots/plot.h"
