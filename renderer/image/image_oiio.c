@@ -1,7 +1,7 @@
 #include "image_oiio.h"
 
 #include "exr_header.h"
-#include "oiio.h"
+#include "image_library.h"
 #include "renderer/base/fs.h"
 
 #include <ctype.h>
@@ -13,7 +13,6 @@
 #include <strings.h>
 #include <sys/stat.h>
 #include <unistd.h>
-#include <zlib.h>
 
 bool image_oiio_file(struct path *path, struct err *e)
 {
@@ -31,103 +30,20 @@ bool image_oiio_file(struct path *path, struct err *e)
 }
 
 /* Loaded for good at the first call; it is found again at the others. */
-static const struct oiio_table *load(struct err *e)
+static const struct image_library *load(struct err *e)
 {
     struct path path;
     if (!image_oiio_file(&path, e))
         return NULL;
     void *module = dlopen(path.s, RTLD_LAZY | RTLD_LOCAL | RTLD_NODELETE);
-    const struct oiio_table *table = module != NULL ? dlsym(module, OIIO_TABLE) : NULL;
+    const struct image_library *table = module != NULL ? dlsym(module, IMAGE_LIBRARY_OIIO) : NULL;
     if (table == NULL)
         err_set(e, "cannot load what reads images: %s", dlerror());
     return table;
 }
 
-static unsigned long big_endian(const unsigned char *b)
-{
-    return (unsigned long)b[0] << 24 | (unsigned long)b[1] << 16 | (unsigned long)b[2] << 8 | b[3];
-}
-
-/* At most how many bytes the pixels of a PNG are before they are deflated: of rows and their filters, twice that for what the passes
- * of an interlaced one round up [PNG 7.2, 8.1]. ihdr: the chunk's data. */
-static double png_bytes(const unsigned char ihdr[13])
-{
-    static const int samples[] = {1, 0, 3, 1, 2, 0, 4};
-    double width = (double)big_endian(ihdr), height = (double)big_endian(ihdr + 4);
-    int channels = ihdr[9] < sizeof samples / sizeof *samples ? samples[ihdr[9]] : 4;
-    return 2 * height * (width * channels * ihdr[8] / 8 + 2);
-}
-
-/* Deflates `length` bytes of f on from where it is, without keeping any. False: there are more than *left, which shrinks. */
-static bool inflates_within(z_stream *z, FILE *f, long length, double *left)
-{
-    unsigned char in[1 << 14], out[1 << 16];
-    int state = Z_OK;
-    while (length > 0 && state == Z_OK && *left >= 0) {
-        size_t n = fread(in, 1, length < (long)sizeof in ? (size_t)length : sizeof in, f);
-        if (n == 0)
-            return true;
-        length -= (long)n;
-        z->next_in = in;
-        z->avail_in = (unsigned)n;
-        do {
-            z->next_out = out;
-            z->avail_out = sizeof out;
-            state = inflate(z, Z_NO_FLUSH);
-            *left -= (double)(sizeof out - z->avail_out);
-        } while (state == Z_OK && *left >= 0 && z->avail_out == 0);
-        if (state == Z_BUF_ERROR) /* it wants more */
-            state = Z_OK;
-    }
-    return *left >= 0; /* what is damaged the library will say */
-}
-
 /* What a file is read for. */
-enum use { FOR_HEAD, FOR_PIXELS, FOR_COLOURS };
-
-/* How stored numbers become linear: the power of them, or sRGB's curve. */
-#define SRGB 0.0
-
-/* Why a PNG is not to be read, or NULL. The library reserves what a chunk says it is long, up to 2 GiB, before it looks [PNG 5.3], and
- * inflates all that a stream holds, a thousandfold of the file, though the pixels are known to be fewer. pixels: they are to be read; how many there are may be wrong for the
- * caller, who is told at no cost. f: after the signature. */
-static const char *png_refusal(FILE *f, long size, bool pixels, double *power)
-{
-    enum { AROUND = 12 /* length, name, checksum */, TEXTS = 1 << 18 };
-    unsigned char head[8 + 13];
-    double left = 0;
-    long texts = 0;
-    z_stream z = {0};
-    const char *why = NULL;
-    bool profile = false;
-    *power = SRGB;
-    if (inflateInit(&z) != Z_OK)
-        return "out of memory";
-    for (long at = 8; why == NULL && at <= size - AROUND;) {
-        bool whole = fseek(f, at, SEEK_SET) == 0 && fread(head, 1, 8, f) == 8;
-        long length = whole ? (long)big_endian(head) : 0;
-        if (!whole || length > size - at - AROUND)
-            why = "the file ends within one of its chunks";
-        else if (memcmp(head + 4, "IHDR", 4) == 0 && length == 13 &&
-                 fread(head + 8, 1, 13, f) == 13)
-            left = png_bytes(head + 8);
-        else if (memcmp(head + 4, "sRGB", 4) == 0 || memcmp(head + 4, "iCCP", 4) == 0)
-            profile = true; /* and wins over gAMA [PNG 11.3.3] */
-        else if (memcmp(head + 4, "gAMA", 4) == 0 && length == 4 && fread(head + 8, 1, 4, f) == 4)
-            *power = 1e5 / fmax(1, (double)big_endian(head + 8));
-        else if (pixels && memcmp(head + 4, "IDAT", 4) == 0 &&
-                 !inflates_within(&z, f, length, &left))
-            why = "its data are more than its pixels";
-        else if ((memcmp(head + 4, "zTXt", 4) == 0 || memcmp(head + 4, "iTXt", 4) == 0) &&
-                 (texts += length) > TEXTS)
-            why = "its texts are too long";
-        at += AROUND + length;
-    }
-    inflateEnd(&z);
-    if (profile)
-        *power = SRGB;
-    return why;
-}
+enum use { FOR_PIXELS, FOR_COLOURS };
 
 static bool is_targa(const char *path)
 {
@@ -136,8 +52,7 @@ static bool is_targa(const char *path)
 }
 
 /* Which of the documented formats the file is of, by its first bytes; NULL with a line. */
-static const char *format_of(const char *path, enum use use, double *size, double *power,
-                             struct err *e)
+static const char *format_of(const char *path, enum use use, double *size, struct err *e)
 {
     struct stat st;
     FILE *f = fs_open(path);
@@ -153,18 +68,15 @@ static const char *format_of(const char *path, enum use use, double *size, doubl
     const char *format = NULL, *why = use == FOR_COLOURS
                                           ? "not an OpenEXR, PNG, JPEG, Radiance or Targa file"
                                           : "not an OpenEXR, Radiance, PNG or PFM file";
-    *power = 1;
     if (n == 8 && memcmp(head, "\x76\x2f\x31\x01", 4) == 0) {
         if (exr_header_is_whole(f, head[4] | (unsigned)head[5] << 8, (long)st.st_size - 8))
             format = "openexr";
         why = "the file ends within its header";
     } else if (n == 8 && memcmp(head, "\x89PNG\r\n\x1a\n", 8) == 0) {
-        why = png_refusal(f, (long)st.st_size, use != FOR_HEAD, power);
-        format = why == NULL ? "png" : NULL;
+        format = "png";
     } else if (n >= 2 && head[0] == '#' && head[1] == '?') {
         format = "hdr";
     } else if (use == FOR_COLOURS) {
-        *power = SRGB;
         if (n >= 3 && memcmp(head, "\xff\xd8\xff", 3) == 0)
             format = "jpeg";
         else if (is_targa(path))
@@ -208,17 +120,18 @@ static bool check_size(const char *path, const struct image_info *i, int depth, 
 }
 
 /* The library left to itself would try every reader that it has, for seconds and with gigabytes if the file is of none. */
-static struct oiio_image *open_image(const char *path, enum use use, const struct oiio_table **with,
-                                     struct image_info *out, double *power, struct err *e)
+static struct library_image *open_image(const char *path, enum use use,
+                                        const struct image_library **with, struct image_info *out,
+                                        struct err *e)
 {
     double size = 0, bytes = 0;
     int depth = 0;
     char why[800];
-    const char *format = format_of(path, use, &size, power, e);
-    *with = format != NULL ? load(e) : NULL;
+    const char *format = format_of(path, use, &size, e);
+    *with = format == NULL ? NULL : strcmp(format, "png") == 0 ? &image_png_library : load(e);
     if (*with == NULL)
         return NULL;
-    struct oiio_image *p = (*with)->open(path, format, use == FOR_COLOURS, why, sizeof why);
+    struct library_image *p = (*with)->open(path, format, use == FOR_COLOURS, why, sizeof why);
     if (p == NULL || !(*with)->head(p, out, &depth, &bytes, why, sizeof why))
         err_set(e, "%s: %s", path, why);
     else if (use == FOR_COLOURS && (double)out->width * out->height > IMAGE_MAX_TEXELS)
@@ -232,28 +145,29 @@ static struct oiio_image *open_image(const char *path, enum use use, const struc
 }
 
 /* The shape with its names, and room for the pixels. */
-static bool alloc_like(const struct oiio_table *oiio, const struct oiio_image *p,
+static bool alloc_like(const struct image_library *library, const struct library_image *p,
                        const struct image_info *info, struct image *im, struct err *e)
 {
     const char *names[IMAGE_MAX_CHANNELS];
     for (int c = 0; c < info->channels; c++)
-        names[c] = oiio->channel(p, c);
+        names[c] = library->channel(p, c);
     return image_alloc(im, info->data_width, info->data_height, info->channels, names, e);
 }
 
 /* The pixels of an open file, which it closes. */
-static bool read_pixels(const char *path, const struct oiio_table *oiio, struct oiio_image *p,
-                        const struct image_info *info, struct image *out, struct err *e)
+static bool read_pixels(const char *path, const struct image_library *library,
+                        struct library_image *p, const struct image_info *info, struct image *out,
+                        struct err *e)
 {
     struct image im = {0};
     struct err inner;
     char why[800];
     const char *name, *value;
-    bool ok = alloc_like(oiio, p, info, &im, &inner) || err_set(e, "%s: %s", path, inner.msg);
-    ok = ok && (oiio->read(p, im.data, why, sizeof why) || err_set(e, "%s: %s", path, why));
-    for (int k = 0; ok && oiio->text(p, k, &name, &value); k++)
+    bool ok = alloc_like(library, p, info, &im, &inner) || err_set(e, "%s: %s", path, inner.msg);
+    ok = ok && (library->read(p, im.data, why, sizeof why) || err_set(e, "%s: %s", path, why));
+    for (int k = 0; ok && library->text(p, k, &name, &value); k++)
         ok = image_set_attr(&im, name, value, &inner) || err_set(e, "%s: %s", path, inner.msg);
-    oiio->close(p);
+    library->close(p);
     if (!ok) {
         image_free(&im);
         return false;
@@ -265,12 +179,11 @@ static bool read_pixels(const char *path, const struct oiio_table *oiio, struct 
 bool image_read(const char *path, struct image *out, bool *half, struct err *e)
 {
     struct image_info info;
-    const struct oiio_table *oiio;
-    double power;
-    struct oiio_image *p = open_image(path, FOR_PIXELS, &oiio, &info, &power, e);
+    const struct image_library *library;
+    struct library_image *p = open_image(path, FOR_PIXELS, &library, &info, e);
     if (half != NULL)
         *half = p != NULL && info.bytes < 4;
-    return p != NULL && read_pixels(path, oiio, p, &info, out, e);
+    return p != NULL && read_pixels(path, library, p, &info, out, e);
 }
 
 /* Which channels are red, green and blue. */
@@ -291,7 +204,7 @@ static bool colour_channels(const struct image *im, int which[3])
 static float linear_of(float stored, double power)
 {
     double c = (double)stored;
-    if (power != SRGB)
+    if (power != IMAGE_SRGB)
         return power == 1 ? stored : (float)pow(c, power);
     return (float)(c <= 0.04045 ? c / 12.92 : pow((c + 0.055) / 1.055, 2.4));
 }
@@ -314,25 +227,23 @@ bool image_read_colours(const char *path, struct image *out, struct err *e)
 {
     struct image_info info;
     struct image im = {0};
-    const struct oiio_table *oiio;
-    double power;
-    struct oiio_image *p = open_image(path, FOR_COLOURS, &oiio, &info, &power, e);
-    if (p == NULL || !read_pixels(path, oiio, p, &info, &im, e))
+    const struct image_library *library;
+    struct library_image *p = open_image(path, FOR_COLOURS, &library, &info, e);
+    if (p == NULL || !read_pixels(path, library, p, &info, &im, e))
         return false;
-    bool ok = image_uncrop(&info, &im, e) && take_colours(&im, power, out, e);
+    bool ok = image_uncrop(&info, &im, e) && take_colours(&im, info.power, out, e);
     image_free(&im);
     return ok || err_prefix(e, "%s", path);
 }
 
 bool image_inspect(const char *path, struct image_info *out, struct err *e)
 {
-    const struct oiio_table *oiio;
-    double power;
-    struct oiio_image *p = open_image(path, FOR_HEAD, &oiio, out, &power, e);
+    const struct image_library *library;
+    struct library_image *p = open_image(path, FOR_PIXELS, &library, out, e);
     if (p == NULL)
         return false;
-    out->parts = oiio->parts(p);
-    oiio->close(p);
+    out->parts = library->parts(p);
+    library->close(p);
     return true;
 }
 
@@ -362,6 +273,6 @@ bool image_uncrop(const struct image_info *info, struct image *im, struct err *e
 
 const char *image_oiio_version(struct err *e)
 {
-    const struct oiio_table *oiio = load(e);
-    return oiio != NULL ? oiio->version : NULL;
+    const struct image_library *library = load(e);
+    return library != NULL ? library->version : NULL;
 }

@@ -1,5 +1,6 @@
-/* Images from elsewhere, by OpenImageIO. That library brings 230 others along and takes a fifth of a second to load, so it is in a
- * file of its own, oiio.so, which is loaded when the first image is read; without it every call fails with a line. */
+/* Images from elsewhere: PNG by libpng, all else by OpenImageIO. That library brings 230 others along and takes a fifth of a second to
+ * load, so it is in a file of its own, oiio.so, which is loaded when the first such image is read; without it the call fails with a
+ * line. */
 #ifndef ASSAY_IMAGE_OIIO_H
 #define ASSAY_IMAGE_OIIO_H
 
@@ -7,7 +8,7 @@
 #include "renderer/base/fs.h"
 
 /* Reads OpenEXR, Radiance, PNG, PFM and PNM, told by their first bytes. Integer formats come scaled to [0,1], no
- * colour conversion. Of OpenEXR it is the data window. Refuses, unread, what is larger than the limits of image.h. *half (may be NULL) tells if the file stored fewer than 32 bits per channel. */
+ * colour conversion. Of OpenEXR it is the data window; PNG's texts of more than 256 KiB are left out. Refuses, unread, what is larger than the limits of image.h. *half (may be NULL) tells if the file stored fewer than 32 bits per channel. */
 NODISCARD bool image_read(const char *path, struct image *out, bool *half, struct err *e);
 
 /* Reads the colours of an OpenEXR, PNG, JPEG, Radiance or (by its name's ending) Targa file as channels R, G and B of
@@ -17,6 +18,7 @@ enum { IMAGE_MAX_TEXELS = 1 << 26 };
 NODISCARD bool image_read_colours(const char *path, struct image *out, struct err *e);
 
 /* What a file stores, told by its header: for a reader that must know how exact the numbers are. */
+#define IMAGE_SRGB 0.0
 enum image_type {
     IMAGE_INT8,
     IMAGE_INT16,
@@ -28,8 +30,9 @@ struct image_info {
     char format[16];      /* OpenImageIO's name: "openexr", "png", "hdr", "pnm" (PFM too), .. */
     enum image_type type; /* the smallest of its channels */
     int bytes;            /* of one value of that channel */
-    int orientation;      /* as in Exif: 1 is row 0 at the top, from left to right */
-    int parts;            /* images in one file (EXR parts), 1 .. */
+    double power;    /* of stored numbers that is linear, IMAGE_SRGB for that curve; for textures */
+    int orientation; /* as in Exif: 1 is row 0 at the top, from left to right */
+    int parts;       /* images in one file (EXR parts), 1 .. */
     int width, height, channels; /* of OpenEXR: of the display window */
     bool is_cropped;             /* the file holds another rectangle than the image: */
     int data_x, data_y, data_width, data_height; /* from the image's top left corner */

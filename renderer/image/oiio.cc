@@ -1,6 +1,6 @@
-// The one C++ file: oiio.h. Exceptions end here, as text.
+// The one C++ file: image_library.h. Exceptions end here, as text.
 extern "C" {
-#include "oiio.h"
+#include "image_library.h"
 }
 
 #include <OpenImageIO/imageio.h>
@@ -13,7 +13,7 @@ extern "C" {
 #include <utility>
 #include <vector>
 
-struct oiio_image {
+struct library_image {
     std::unique_ptr<OIIO::ImageInput> in;
     std::vector<std::pair<std::string, std::string>> texts;
 };
@@ -51,12 +51,12 @@ enum image_type type_of(OIIO::TypeDesc type)
                                             : IMAGE_OTHER;
 }
 
-struct oiio_image *open_image(const char *path, const char *format, bool straight, char *why,
+struct library_image *open_image(const char *path, const char *format, bool straight, char *why,
                               size_t size)
 {
-    std::unique_ptr<oiio_image> p;
+    std::unique_ptr<library_image> p;
     bool ok = guarded(why, size, [&]() -> std::string {
-        p = std::make_unique<oiio_image>();
+        p = std::make_unique<library_image>();
         OIIO::ImageSpec spec, how;
         if (straight)
             how["oiio:UnassociatedAlpha"] = 1;
@@ -71,18 +71,19 @@ struct oiio_image *open_image(const char *path, const char *format, bool straigh
     return ok ? p.release() : nullptr;
 }
 
-void close_image(struct oiio_image *p)
+void close_image(struct library_image *p)
 {
     delete p;
 }
 
-bool head_of(struct oiio_image *p, struct image_info *out, int *depth, double *bytes, char *why,
+bool head_of(struct library_image *p, struct image_info *out, int *depth, double *bytes, char *why,
              size_t size)
 {
     *out = {};
     return guarded(why, size, [&]() -> std::string {
         const OIIO::ImageSpec &spec = p->in->spec();
-        bool exr = std::string(p->in->format_name()) == "openexr";
+        const std::string format = p->in->format_name();
+        bool exr = format == "openexr";
         out->width = exr ? spec.full_width : spec.width;
         out->height = exr ? spec.full_height : spec.height;
         // Further off than any image is wide, it shows nothing anyway.
@@ -94,7 +95,7 @@ bool head_of(struct oiio_image *p, struct image_info *out, int *depth, double *b
         out->channels = spec.nchannels;
         *depth = spec.depth;
         *bytes = double(spec.image_bytes(true));
-        std::snprintf(out->format, sizeof out->format, "%s", p->in->format_name());
+        std::snprintf(out->format, sizeof out->format, "%s", format.c_str());
         size_t smallest = 8;
         for (int c = 0; c < spec.nchannels; c++)
             if (spec.channelformat(c).size() < smallest) {
@@ -105,6 +106,7 @@ bool head_of(struct oiio_image *p, struct image_info *out, int *depth, double *b
         int bits = spec.get_int_attribute("oiio:BitsPerSample", int(8 * smallest));
         if (spec.deep || smallest == 8 || bits != int(8 * smallest))
             out->type = IMAGE_OTHER;
+        out->power = format == "jpeg" || format == "targa" ? IMAGE_SRGB : 1;
         out->orientation = spec.get_int_attribute("Orientation", 1);
         out->is_cropped = spec.x != spec.full_x || spec.y != spec.full_y ||
                           spec.width != spec.full_width || spec.height != spec.full_height;
@@ -112,13 +114,13 @@ bool head_of(struct oiio_image *p, struct image_info *out, int *depth, double *b
     });
 }
 
-const char *channel_of(const struct oiio_image *p, int c)
+const char *channel_of(const struct library_image *p, int c)
 {
     const auto &names = p->in->spec().channelnames;
     return size_t(c) < names.size() ? names[size_t(c)].c_str() : "";
 }
 
-bool read_image(struct oiio_image *p, float *data, char *why, size_t size)
+bool read_image(struct library_image *p, float *data, char *why, size_t size)
 {
     return guarded(why, size, [&]() -> std::string {
         if (p->in->spec().deep)
@@ -129,7 +131,7 @@ bool read_image(struct oiio_image *p, float *data, char *why, size_t size)
     });
 }
 
-bool text_of(const struct oiio_image *p, int k, const char **name, const char **value)
+bool text_of(const struct library_image *p, int k, const char **name, const char **value)
 {
     if (size_t(k) >= p->texts.size())
         return false;
@@ -138,7 +140,7 @@ bool text_of(const struct oiio_image *p, int k, const char **name, const char **
     return true;
 }
 
-int parts_of(struct oiio_image *p)
+int parts_of(struct library_image *p)
 {
     int parts = 1;
     char why[8];
@@ -153,8 +155,8 @@ int parts_of(struct oiio_image *p)
 
 } // namespace
 
-extern "C" const struct oiio_table assay_oiio;
-const struct oiio_table assay_oiio = {"OpenImageIO " OIIO_VERSION_STRING,
+extern "C" const struct image_library assay_oiio;
+const struct image_library assay_oiio = {"OpenImageIO " OIIO_VERSION_STRING,
                                       open_image,
                                       close_image,
                                       head_of,

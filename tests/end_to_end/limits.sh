@@ -59,7 +59,7 @@ for kind in exr hdr; do
     render "a sky of 10^6 x 10^6, $kind" "big.$kind: cannot read" -e "$tmp/big.$kind"
 done
 
-# 2 MB that inflate to 2 GB behind the 64 x 64 pixels of a PNG, and the same in its texts. Controls: what is asked for, and no more, is read.
+# 2 MB that inflate to 2 GB behind the 64 x 64 pixels of a PNG, which is refused; and the same in its texts, which are left out.
 png() { # FILE BYTES TEXTS: an image with so many bytes in its stream, and texts of a MB each
     python3 - "$@" <<'END'
 import struct, sys, zlib
@@ -78,12 +78,13 @@ END
 if png "$tmp/right.png" $((64 * 193)) 1; then
     png "$tmp/bomb.png" 2000000000 0
     png "$tmp/texts.png" $((64 * 193)) 300
-    "$assay" compare --curve srgb "$tmp/right.png" "$tmp/right.png" >"$tmp/said" 2>&1 </dev/null
-    grep -q "every pixel is saturated" "$tmp/said" && echo "ok limits: a PNG of just its pixels" ||
-        { echo "not ok limits: a PNG of just its pixels: $(cat "$tmp/said")" && failures=$((failures + 1)); }
     ulimit -S -t 4
+    for file in right texts; do
+        "$assay" compare --curve srgb "$tmp/$file.png" "$tmp/$file.png" >"$tmp/said" 2>&1 </dev/null
+        grep -q "every pixel is saturated" "$tmp/said" && echo "ok limits: a PNG, $file" ||
+            { echo "not ok limits: a PNG, $file: $(cat "$tmp/said")" && failures=$((failures + 1)); }
+    done
     refused "a PNG that inflates to 2 GB" "its data are more than its pixels" "$assay" compare --curve srgb "$tmp/bomb.png" "$tmp/right.png"
-    refused "a PNG whose texts inflate to 2 GB" "its texts are too long" "$assay" compare --curve srgb "$tmp/texts.png" "$tmp/right.png"
     ulimit -S -t unlimited
 else echo "skip limits: PNG files that inflate to more: no python3"; fi
 

@@ -48,8 +48,6 @@ fuzz_one() {
     places=("$corpus" "$dir/$name.seeds")
     [ -d "tests/fuzz/found/$name" ] && places+=("tests/fuzz/found/$name")
     [ -f "tests/fuzz/$name.dict" ] && options+=(-dict="tests/fuzz/$name.dict")
-    # OpenImageIO's PNG reader leaves its strings behind where libpng jumps out of it; those leaks are not ours.
-    [ "$name" = picture ] && export ASAN_OPTIONS=detect_leaks=0
     "$build/clang/fuzz_$name" "${options[@]}" -max_len=20000 -rss_limit_mb=2048 -timeout=20 \
         -print_final_stats=1 -artifact_prefix="$dir/$name-" "${places[@]}" >"$dir/$name.log" 2>&1
     status=$?

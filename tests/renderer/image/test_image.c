@@ -1,12 +1,14 @@
 /* Our readers and writers of image files against OpenImageIO's, a route of its own: the same bits of
  * every channel, whichever way OpenEXR and RGBE pack them; and files that are cut short or damaged. */
 #include "renderer/base/fs.h"
-#include "renderer/image/image_oiio.h"
+#include "renderer/image/image_library.h"
 #include "renderer/math/sampler.h"
 #include "reference/base/process.h"
 #include "tests/support/test.h"
 
+#include <dlfcn.h>
 #include <openexr.h>
+#include <png.h>
 #include <zlib.h>
 
 enum { WIDTH = 37, HEIGHT = 29, CHANNELS = 5, MAX_FILE = 1 << 16 };
@@ -223,6 +225,114 @@ TEST(png_texts)
     }
     assert_null(image_get_attr(&got, "assay:scene"));
     image_free(&got);
+}
+
+static void write_odd_png(const char *path, int type, int bits, bool passes, bool clear)
+{
+    png_color colours[256];
+    uint8_t row[8 * WIDTH], alphas[256];
+    const png_color_16 hidden = {.red = 3, .green = 5, .blue = 9, .gray = 1};
+    FILE *f = fopen(path, "wb");
+    png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, NULL, NULL, NULL);
+    png_infop info = png_create_info_struct(png);
+    assert_non_null(f);
+    png_init_io(png, f);
+    png_set_IHDR(png, info, WIDTH, HEIGHT, bits, type,
+                 passes ? PNG_INTERLACE_ADAM7 : PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
+                 PNG_FILTER_TYPE_DEFAULT);
+    for (int i = 0; i < 256; i++) {
+        colours[i] = (png_color){(png_byte)(i * 7), (png_byte)(255 - i), (png_byte)(i * i)};
+        alphas[i] = i % 3 == 0 ? 255 : (uint8_t)i;
+    }
+    if (type == PNG_COLOR_TYPE_PALETTE)
+        png_set_PLTE(png, info, colours, 1 << bits);
+    if (clear)
+        png_set_tRNS(png, info, alphas, 1 << (bits < 8 ? bits : 7), &hidden);
+    png_write_info(png, info);
+    for (int pass = png_set_interlace_handling(png); pass > 0; pass--)
+        for (int y = 0; y < HEIGHT; y++) {
+            for (int i = 0; i < 8 * WIDTH; i++)
+                row[i] = (uint8_t)(i * 37 + y * y * 11);
+            png_write_row(png, row);
+        }
+    png_write_end(png, NULL);
+    png_destroy_write_struct(&png, &info);
+    assert_int_equal(fclose(f), 0);
+}
+
+/* Every kind of PNG [11.2.2]: grey, colours and palettes of all depths, in one pass or seven, with a colour or a palette that is
+ * transparent. The other route is OpenImageIO's reader. */
+TEST(png_as_others_write_it)
+{
+    static const struct {
+        int type, least, most;
+    } kinds[] = {{PNG_COLOR_TYPE_GRAY, 1, 16},
+                 {PNG_COLOR_TYPE_RGB, 8, 16},
+                 {PNG_COLOR_TYPE_PALETTE, 1, 8},
+                 {PNG_COLOR_TYPE_GRAY_ALPHA, 8, 16},
+                 {PNG_COLOR_TYPE_RGB_ALPHA, 8, 16}};
+    static float theirs[4 * WIDTH * HEIGHT];
+    char name[256], why[200];
+    int depth;
+    double bytes;
+    struct image ours;
+    struct image_info info, other;
+    struct path module;
+    struct err e = {""};
+    MUST(image_oiio_file(&module, &e));
+    void *handle = dlopen(module.s, RTLD_LAZY | RTLD_LOCAL | RTLD_NODELETE);
+    const struct image_library *oiio = dlsym(handle, IMAGE_LIBRARY_OIIO);
+    path_of(name, "odd.png");
+    for (size_t k = 0; k < sizeof kinds / sizeof *kinds; k++)
+        for (int bits = kinds[k].least; bits <= kinds[k].most; bits *= 2)
+            for (int form = 0; form < 4; form++) {
+                bool has_alpha = kinds[k].type & PNG_COLOR_MASK_ALPHA,
+                     clear = form / 2 && !has_alpha;
+                write_odd_png(name, kinds[k].type, bits, form % 2, clear);
+                MUST(image_inspect(name, &info, &e));
+                MUST(image_read(name, &ours, NULL, &e));
+                struct library_image *p = oiio->open(name, "png", true, why, sizeof why);
+                assert_true(p != NULL && oiio->head(p, &other, &depth, &bytes, why, sizeof why) &&
+                            oiio->read(p, theirs, why, sizeof why));
+                assert_true(info.type == other.type && info.bytes == other.bytes);
+                assert_true(ours.width == WIDTH && ours.height == HEIGHT);
+                assert_true(ours.channels == other.channels);
+                assert_int_equal(image_channel(&ours, "A") >= 0, clear || has_alpha);
+                for (int c = 0; c < ours.channels; c++)
+                    assert_string_equal(ours.names[c], oiio->channel(p, c));
+                assert_memory_equal(ours.data, theirs,
+                                    sizeof(float) * WIDTH * HEIGHT * (size_t)ours.channels);
+                oiio->close(p);
+                image_free(&ours);
+            }
+}
+
+/* How cameras write it, in the byte orders of either [TIFF 6.0, 2]. */
+TEST(png_that_is_turned)
+{
+    uint8_t exif[2][26] = {"II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0\x06\0\0\0\0\0\0",
+                           "MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x08\0\0\0\0\0"};
+    static const uint8_t pixel[3];
+    char path[256];
+    struct image_info info;
+    struct err e = {""};
+    for (int k = 0; k < 2; k++) {
+        FILE *f = fopen(path_of(path, "turned.png"), "wb");
+        png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, NULL, NULL, NULL);
+        png_infop head = png_create_info_struct(png);
+        assert_non_null(f);
+        png_init_io(png, f);
+        png_set_IHDR(png, head, 1, 1, 8, PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE,
+                     PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+        png_set_eXIf_1(png, head, sizeof exif[k], exif[k]);
+        png_write_info(png, head);
+        png_write_row(png, pixel);
+        png_write_end(png, NULL);
+        png_destroy_write_struct(&png, &head);
+        assert_int_equal(fclose(f), 0);
+        MUST(image_inspect(path, &info, &e));
+        assert_int_equal(info.orientation, k == 0 ? 6 : 8);
+    }
 }
 
 static bool read_bytes(const char *name, const uint8_t *bytes, size_t size, struct err *e)
