@@ -8,6 +8,7 @@
 #include "renderer/base/fs.h"
 #include "tests/support/rates.h"
 #include "tests/support/simulate.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #include <gsl/gsl_cdf.h>
@@ -54,7 +55,7 @@ static struct mitsuba_reference black_reference(double var)
 TEST(test_mitsuba_boundary)
 {
     struct mitsuba_reference r = black_reference(0);
-    struct moments a = new_moments(SIDE, SIDE, "sample");
+    OWN(moments) a = new_moments(SIDE, SIDE, "sample");
     double critical = mitsuba_critical_z(MITSUBA_LEVEL, PIXELS);
     constant(&a, 0, 64);
     assert_int_equal(mitsuba_allowed(MITSUBA_SHARE, PIXELS), 30);
@@ -64,7 +65,6 @@ TEST(test_mitsuba_boundary)
         assert_int_equal(mitsuba_score(z, PIXELS, 30) >= critical, blue > 30);
         a.mean[3 * (blue * 97) + 2] = 0.0075;
     }
-    moments_free(&a);
 }
 
 /* Variance 4 and 64 samples: the standard error is 1/4. A grey of 1 has Y = 1: z = 4. The critical z
@@ -72,7 +72,7 @@ TEST(test_mitsuba_boundary)
 TEST(test_mitsuba_z)
 {
     struct mitsuba_reference r = black_reference(4);
-    struct moments a = new_moments(SIDE, SIDE, "sample");
+    OWN(moments) a = new_moments(SIDE, SIDE, "sample");
     constant(&a, 1, 64);
     mitsuba_z(&a, &r, z);
     assert_near(z[1], 4, 1e-4);
@@ -84,7 +84,6 @@ TEST(test_mitsuba_z)
         z[i] = (double)(i * 7919 % (3 * PIXELS));
     for (size_t k = 0; k < 3 * PIXELS; k += 1111)
         assert_near(mitsuba_score(z, PIXELS, k), (double)(3 * PIXELS - 1 - k), 0);
-    moments_free(&a);
 }
 
 /* n = 4 and M2 = 12 on both sides: the means have variance 1 each, so a difference of d has
@@ -92,7 +91,7 @@ TEST(test_mitsuba_z)
  * 1 - (1-p)^k with p from GSL. */
 TEST(test_welch)
 {
-    struct moments a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
+    OWN(moments) a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
     constant(&a, 5, 4);
     constant(&b, 5, 4);
     assert_near(welch_log10_p(&a, &b), 0, 0); /* nothing to test */
@@ -106,8 +105,6 @@ TEST(test_welch)
     double p = 2 * gsl_cdf_tdist_Q(2e10 / sqrt(2), 6);
     assert_true(p < 1e-50);
     assert_near(welch_log10_p(&a, &b), log10(3 * p), 1e-6);
-    moments_free(&a);
-    moments_free(&b);
 }
 
 /* Values with variance of the mean 1 on both sides. In the second tile of 16 x 16 green of A is larger by 1/2 in
@@ -116,7 +113,7 @@ TEST(test_welch)
  * corner of 16 x 16 has all of it. Without noise nothing is tested. */
 TEST(test_tiles)
 {
-    struct moments a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
+    OWN(moments) a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
     constant(&a, 5, 4);
     constant(&b, 5, 4);
     a.mean[7] = 6;
@@ -140,22 +137,18 @@ TEST(test_tiles)
             a.mean[3 * (y * SIDE + x)] = 4;
     assert_near(tiles_log10_p(&a, &b, 48), log10(12 * 2 * gsl_cdf_ugaussian_Q(256 / sqrt(512))),
                 1e-9);
-    moments_free(&a);
-    moments_free(&b);
 }
 
 /* 256 of 12288 values differ by 1 of 5: sqrt(1/48)/5. */
 TEST(test_rmse)
 {
-    struct moments a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
+    OWN(moments) a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
     constant(&a, 5, 4);
     constant(&b, 5, 4);
     assert_near(relative_rmse(&a, &b), 0, 0);
     for (size_t i = 0; i < 256; i++)
         a.mean[7 * i] += i % 2 == 0 ? 1 : -1;
     assert_near(relative_rmse(&a, &b), sqrt(1.0 / 48) / 5, 1e-12);
-    moments_free(&a);
-    moments_free(&b);
 }
 
 /* sRGB of 0.5 is 1.055 0.5^(1/2.4) - 0.055 = 0.73536, times 255 is 187.5; of 0.002 12.92 0.002 =
@@ -273,7 +266,7 @@ TEST(test_intervals)
 TEST(test_make_wrong)
 {
     struct anchor_pool p = {.side = SIDE, .num_places = 2, .place = {{4, 24}, {44, 4}}};
-    struct moments in = new_moments(SIDE, SIDE, "sample"), out = new_moments(SIDE, SIDE, "sample");
+    OWN(moments) in = new_moments(SIDE, SIDE, "sample"), out = new_moments(SIDE, SIDE, "sample");
     p.bounced = calloc(3 * PIXELS, sizeof *p.bounced);
     assert_non_null(p.bounced);
     for (size_t i = 0; i < 3 * PIXELS; i++) {
@@ -296,8 +289,6 @@ TEST(test_make_wrong)
         }
     }
     free(p.bounced);
-    moments_free(&in);
-    moments_free(&out);
 }
 
 /* Real renders of a sphere lamp over a plane, 24 x 24 pixels, 64 samples. H0: A and B have the same
@@ -307,7 +298,7 @@ TEST(test_make_wrong)
 TEST(test_real_renders)
 {
     enum { SMALL = 24, N = 4, CELLS = SMALL * SMALL };
-    struct anchor_pool p;
+    OWN(anchor_pool) p;
     struct err e = {""};
     struct anchor_job job = {.scene = "33_sphere_light",
                              .side = SMALL,
@@ -330,7 +321,7 @@ TEST(test_real_renders)
     assert_true(anchor_noise(&p) > 0.1 && anchor_noise(&p) < 1);
     assert_true(welch_log10_p(&p.render[0], &p.render[1]) > -6);
 
-    struct moments wrong = new_moments(SMALL, SMALL, "sample");
+    OWN(moments) wrong = new_moments(SMALL, SMALL, "sample");
     anchor_make_wrong(&p, &p.render[0], ANCHOR_GLOBAL, 1, 0, &wrong);
     assert_true(welch_log10_p(&wrong, &p.render[1]) < -6);
     mitsuba_z(&wrong, &p.reference, z);
@@ -342,8 +333,6 @@ TEST(test_real_renders)
     idiff_quantise(&p.render[1], 1, b);
     idiff_histogram(a, b, CELLS, count);
     assert_true(idiff_differs(count, CELLS, BLENDER_FAIL, BLENDER_PERCENT));
-    moments_free(&wrong);
-    anchor_pool_free(&p);
 }
 
 /* The page in the repository is what its record gives, byte for byte; the record was made with the

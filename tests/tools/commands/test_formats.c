@@ -1,6 +1,7 @@
 /* The manuals of files (tools/docs/formats): the real reader takes every example, and a page's tables list what the reader knows,
  * no key more, none less. What a reader knows is asked of it: every word in quotes in its folder is tried as a key. */
 #include "tests/support/suite_files.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #include "reference/external/engine_description.h"
@@ -31,7 +32,7 @@ static void read_block(const char *page, const char *language, int k, char block
 {
     char fence[32], path[128];
     snprintf(path, sizeof path, "tools/docs/formats/%s", page);
-    char *text = test_read(path);
+    OWN_TEXT text = test_read(path);
     snprintf(fence, sizeof fence, "```%s\n", language);
     const char *at = text;
     for (; k >= 0; k--)
@@ -42,7 +43,6 @@ static void read_block(const char *page, const char *language, int k, char block
     const char *end = strstr(at, "\n```");
     assert_non_null(end);
     snprintf(block, TEXT, "%.*s\n", (int)(end - at), at);
-    free(text);
 }
 
 static json_t *load_block(const char *page, int k)
@@ -131,13 +131,12 @@ static void source_words(const char *folder, struct words *out)
         if (dot == NULL || strcmp(dot, ".c") != 0)
             continue;
         snprintf(path, sizeof path, "%s/%s", folder, entry->d_name);
-        char *text = test_read(path);
+        OWN_TEXT text = test_read(path);
         for (const char *c = strchr(text, '"'); c != NULL; c = strchr(c + 1, '"')) {
             size_t n = name_length(c + 1);
             if (c[1 + n] == '"')
                 words_add(out, c + 1, n);
         }
-        free(text);
     }
     closedir(d);
 }
@@ -195,14 +194,12 @@ static bool is_known_in(json_t *whole, json_t *at, const char *word, bool (*read
             json_object_set_new(at, word, before);
         else
             json_object_del(at, word);
-        json_object_foreach(at, key, v)
-        {
+        json_object_foreach(at, key, v) {
             known = known || (strcmp(key, "values") != 0 && is_known_in(whole, v, word, reads));
         }
     }
     if (json_is_array(at))
-        json_array_foreach(at, i, v)
-        {
+        json_array_foreach(at, i, v) {
             known = known || is_known_in(whole, v, word, reads);
         }
     return known;
@@ -244,10 +241,8 @@ static bool reads_scenes(json_t *scenes)
 
 static bool knows_scene_key(const char *word)
 {
-    json_t *scenes = json_pack("[o, o]", load_block("scene.md", 0), load_block("scene.md", 1));
-    bool known = is_known_in(scenes, scenes, word, reads_scenes);
-    json_decref(scenes);
-    return known;
+    json_auto_t *scenes = json_pack("[o, o]", load_block("scene.md", 0), load_block("scene.md", 1));
+    return is_known_in(scenes, scenes, word, reads_scenes);
 }
 
 TEST(scenes_are_as_their_page_says)
@@ -334,18 +329,14 @@ static bool loads_engine(const char *text, const char *not_known)
 
 static bool reads_engine(json_t *description)
 {
-    char *text = json_dumps(description, 0);
-    bool known = loads_engine(text, "unknown");
-    free(text);
-    return known;
+    OWN_TEXT text = json_dumps(description, 0);
+    return loads_engine(text, "unknown");
 }
 
 static bool knows_engine_key(const char *word)
 {
-    json_t *description = load_block("engine.md", 0);
-    bool known = is_known_in(description, description, word, reads_engine);
-    json_decref(description);
-    return known;
+    json_auto_t *description = load_block("engine.md", 0);
+    return is_known_in(description, description, word, reads_engine);
 }
 
 static bool knows_placeholder(const char *word)
@@ -469,20 +460,15 @@ static json_t *example_results(void)
 static bool refuses_results(json_t *results)
 {
     struct err e;
-    json_t *read;
+    json_auto_t *read = NULL;
     dump(results, "results.json");
-    if (!results_read(test_path("results.json"), &read, &e))
-        return true;
-    json_decref(read);
-    return false;
+    return !results_read(test_path("results.json"), &read, &e);
 }
 
 static bool knows_member(const char *word)
 {
-    json_t *results = example_results();
-    bool known = is_known_in(results, results, word, refuses_results);
-    json_decref(results);
-    return known;
+    json_auto_t *results = example_results();
+    return is_known_in(results, results, word, refuses_results);
 }
 
 TEST(results_are_as_their_page_says)
@@ -508,17 +494,16 @@ TEST(grades_are_as_their_page_says)
     MUST(fs_make_dirs(test_path("grades/bob"), &e));
     MUST(grade_write(test_path("grades"), NULL, NULL, grades, &e));
     json_decref(grades);
-    json_t *gradescope = json_load_file(test_path("grades/bob/results.json"), 0, NULL);
+    json_auto_t *gradescope = json_load_file(test_path("grades/bob/results.json"), 0, NULL);
     const json_t *test = json_array_get(json_object_get(gradescope, "tests"), 0);
     assert_string_equal(json_string_value(json_object_get(test, "status")), "failed");
     assert_true(json_number_value(json_object_get(test, "max_score")) == 6);
-    json_decref(gradescope);
 }
 
 TEST(plans_are_as_their_page_says)
 {
     static char text[TEXT], ours[TEXT + 128];
-    struct plan p;
+    OWN(plan) p;
     struct err e;
     read_block("plan.md", "jsonl", 0, text);
     char *version = strstr(text, "0.1 (commit ");
@@ -531,5 +516,4 @@ TEST(plans_are_as_their_page_says)
     assert_int_equal(p.num, 2);
     assert_string_equal(plan_text(&p, "kind"), "pathtracer");
     assert_false(job_run_is_made(&p, 1));
-    plan_free(&p);
 }

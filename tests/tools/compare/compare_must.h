@@ -3,11 +3,8 @@
 #define ASSAY_TESTS_COMPARE_MUST_H
 
 #include "tools/compare/compare.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
-
-/* Freed where their block ends. */
-#define MOMENTS    __attribute__((cleanup(moments_free))) struct moments
-#define COMPARISON __attribute__((cleanup(comparison_free))) struct comparison
 
 /* Fails the test where there can be no comparison. */
 static inline struct comparison compare(const struct moments *a, const struct moments *b,

@@ -12,7 +12,7 @@
 static enum verdict verdict_of(const struct moments *a, const struct moments *b,
                                struct compare_options opt)
 {
-    COMPARISON c = compare(a, b, opt);
+    OWN(comparison) c = compare(a, b, opt);
     return c.verdict;
 }
 
@@ -35,7 +35,7 @@ static void set_all(struct moments *m, double n, double mean, double m2, double 
  * The mean square of the pixels is 1e-4 - 4 < 0: no bias to report. */
 TEST(test_by_hand)
 {
-    MOMENTS a = new_moments(8, 8, "sample"), b = new_moments(8, 8, "replicate");
+    OWN(moments) a = new_moments(8, 8, "sample"), b = new_moments(8, 8, "replicate");
     set_all(&a, 101, 1.01, 10100, 0);
     set_all(&b, 101, 1, 30300, 0);
     struct comparison c = compare(&a, &b, (struct compare_options){0.05, 0, 0, 4, 0});
@@ -94,11 +94,11 @@ TEST(test_pyramid_brute_force)
     uint64_t seed = 5;
     for (size_t s = 0; s < COUNT(sizes); s++) {
         int w = sizes[s][0], h = sizes[s][1], tile = sizes[s][2];
-        MOMENTS a = new_moments(w, h, "sample"), b = new_moments(w, h, "sample");
+        OWN(moments) a = new_moments(w, h, "sample"), b = new_moments(w, h, "sample");
         simulate(&a, LAW_EXPONENTIAL, 1, 7, false, &seed);
         simulate(&b, LAW_EXPONENTIAL, 2, 9, false, &seed);
         for (int channel = 0; channel < 4; channel++) {
-            struct pyramid p;
+            OWN(pyramid) p;
             struct err e;
             assert_true(pyramid_build(&a, &b, channel, tile, &p, &e));
             assert_int_equal(p.level[p.tile_level].side, tile);
@@ -137,7 +137,6 @@ TEST(test_pyramid_brute_force)
                 }
                 assert_int_equal(covered, w * h);
             }
-            pyramid_free(&p);
         }
     }
 }
@@ -150,14 +149,14 @@ TEST(test_pyramid_of_bands)
     uint64_t seed = 6;
     for (size_t s = 0; s < COUNT(sizes); s++) {
         int w = sizes[s][0], h = sizes[s][1], tile = sizes[s][2];
-        MOMENTS a = new_moments(w, h, "sample"), file;
+        OWN(moments) a = new_moments(w, h, "sample"), file;
         simulate(&a, LAW_EXPONENTIAL, 1, 7, false, &seed);
         struct err e;
         MUST(moments_write(test_path("bands.exr"), &a, NULL, 0, &e));
         MUST(moments_read_packed(test_path("bands.exr"), &file, &e));
         moments_free(&a);
         MUST(moments_read(test_path("bands.exr"), &a, NULL, &e));
-        struct pyramid whole, above, p = {0};
+        OWN(pyramid) whole, above, p = {0};
         MUST(pyramid_build(&a, &a, 3, tile, &whole, &e));
         const struct pyramid levels = pyramid_levels(w, h, tile);
         MUST(pyramid_above(&levels, &above, &e));
@@ -182,9 +181,6 @@ TEST(test_pyramid_of_bands)
             assert_memory_equal(above.level[l].cell, whole.level[whole.tile_level + l].cell,
                                 (size_t)above.level[l].nx * (size_t)above.level[l].ny *
                                     sizeof *p.cells);
-        pyramid_free(&p);
-        pyramid_free(&above);
-        pyramid_free(&whole);
     }
 }
 
@@ -208,10 +204,10 @@ TEST(test_every_size)
         if (w * h > 480 * 360)
             continue;
         double v = sizes[s].compared ? 0.004 : 1e-7;
-        MOMENTS a = new_moments(w, h, "sample"), b = new_moments(w, h, "sample");
+        OWN(moments) a = new_moments(w, h, "sample"), b = new_moments(w, h, "sample");
         set_all(&a, 1001, 1, v * 1001 * 1000, 0);
         set_all(&b, 1001, 1, 1.001 * v * 1001 * 1000, 0); /* no pixel is the same on both sides */
-        COMPARISON c = compare(&a, &b, opt);
+        OWN(comparison) c = compare(&a, &b, opt);
         assert_int_equal(c.verdict, VERDICT_EQUIVALENT);
         assert_int_equal(c.tiles_x, sizes[s].tiles_x);
         assert_int_equal(c.tiles_y, sizes[s].tiles_y);
@@ -221,7 +217,7 @@ TEST(test_every_size)
         for (int i = 0; i < 3 * w * h; i++)
             if (i / 3 % w >= x && i / 3 / w >= y)
                 a.mean[i] = 0.5;
-        COMPARISON d = compare(&a, &b, opt);
+        OWN(comparison) d = compare(&a, &b, opt);
         assert_int_equal(d.verdict, VERDICT_DIFFERENT);
         assert_true(d.worst_tile.x == x && d.worst_tile.y == y);
         assert_true(d.worst_tile.width == w - x && d.worst_tile.height == h - y);
@@ -233,7 +229,7 @@ TEST(test_every_size)
  * correlated, so luminance is the same observations times .2126 + .7152/2 + .0722/4. */
 TEST(test_estimate_by_hand)
 {
-    MOMENTS m = new_moments(1, 1, "sample");
+    OWN(moments) m = new_moments(1, 1, "sample");
     const double x[3] = {1, 2, 6};
     for (int i = 0; i < 3; i++)
         moments_add(&m, 0, (double[3]){x[i], 0.5 * x[i], 0.25 * x[i]});
@@ -254,7 +250,7 @@ TEST(test_estimate_by_hand)
  * pixels of n = 64 put the ratio of means within 5 % (its standard error is below 1.5 %). */
 TEST(test_luminance_bound)
 {
-    MOMENTS m = new_moments(400, 1, "sample"), lum = new_moments(400, 1, "sample");
+    OWN(moments) m = new_moments(400, 1, "sample"), lum = new_moments(400, 1, "sample");
     uint64_t seed = 9;
     double bound = 0, truth = 0;
     for (size_t p = 0; p < 400; p++) {
@@ -319,7 +315,7 @@ TEST(test_half_pixel_shift)
  * more observations than could all have missed something as bright as what is seen. */
 TEST(test_noise_free)
 {
-    MOMENTS a = new_moments(8, 8, "sample"), b = new_moments(8, 8, "sample");
+    OWN(moments) a = new_moments(8, 8, "sample"), b = new_moments(8, 8, "sample");
     struct compare_options opt = {1e-3, 0, 0, 4, 0}, margin = {1e-3, 0.01, 0.02, 4, 0};
     constant(&a, 15, 64);
     constant(&b, 15 * (1 + 3e-6), 64);
@@ -342,7 +338,7 @@ TEST(test_noise_free)
             a.mean[c] = 0;
             b.mean[c] = 0.1;
         }
-        COMPARISON c = compare(&a, &b, opt);
+        OWN(comparison) c = compare(&a, &b, opt);
         /* event 1, a luminance of 0.1 in one pixel, tolerance 1e-5 0.1 */
         assert_near(c.worst.log10_p * log(10), -n * (0.1 - 1e-6), 0.02 * n * 0.1);
         assert_int_equal(c.verdict, n == 64 ? VERDICT_NOTHING_FOUND : VERDICT_DIFFERENT);
@@ -367,7 +363,7 @@ TEST(test_one_value_each)
     struct compare_options opt = {1e-6, 0, 0, 4, 0}, margin = {1e-6, 0.01, 0.02, 4, 0};
     enum { SEEN, BLACK, EXACT, VARIED, INSIDE, FEW, CASES };
     for (int k = 0; k < CASES; k++) {
-        MOMENTS a = new_moments(8, 8, "sample"), b = new_moments(8, 8, "sample");
+        OWN(moments) a = new_moments(8, 8, "sample"), b = new_moments(8, 8, "sample");
         int few = k == FEW ? 4 : 20;
         constant(&a, 1, 64);
         constant(&b, 1, k == EXACT ? 1 : few);
@@ -385,7 +381,7 @@ TEST(test_one_value_each)
             if (k == BLACK)
                 b.mean[c] = 0;
         }
-        COMPARISON c = compare(&a, &b, k == INSIDE ? margin : opt);
+        OWN(comparison) c = compare(&a, &b, k == INSIDE ? margin : opt);
         if (k == SEEN) {
             assert_int_equal(c.verdict, VERDICT_DIFFERENT);
             assert_near(c.worst.log10_p, log10(2 * fmin(most_likely(64, 20), most_likely(20, 64))),
@@ -402,7 +398,7 @@ TEST(test_one_value_each)
  * errors, and nothing. Control: 1e-3 apart is DIFFERENT. */
 TEST(test_rounding_noise)
 {
-    MOMENTS a = new_moments(4, 4, "sample"), b = new_moments(4, 4, "sample");
+    OWN(moments) a = new_moments(4, 4, "sample"), b = new_moments(4, 4, "sample");
     struct compare_options opt = {1e-3, 0, 0, 2, 0};
     set_all(&a, 1000, 0.5, 1000 * 2.5e-17, 0);
     set_all(&b, 1000, 0.5 * (1 + 1e-7), 1000 * 2.5e-17, 0);
@@ -417,7 +413,7 @@ TEST(test_rounding_noise)
  * test nor interval, so INCONCLUSIVE although the means differ by 8 standard errors. */
 TEST(test_skew_guard)
 {
-    MOMENTS a = new_moments(8, 8, "sample"), b = new_moments(8, 8, "exact");
+    OWN(moments) a = new_moments(8, 8, "sample"), b = new_moments(8, 8, "exact");
     const double n = 1000, v = 0.01 * 0.01;
     double m2 = v * n * (n - 1);
     constant(&b, 1, 1);
@@ -426,7 +422,7 @@ TEST(test_skew_guard)
             double k3 = (skewed ? 2 : 0.001) * v * sqrt(v);
             set_all(&a, n, 1.01, m2, k3 * n * (n - 1) * (n - 2));
             struct compare_options opt = {1e-3, margin ? 0.001 : 0, margin ? 0.002 : 0, 4, 0};
-            COMPARISON c = compare(&a, &b, opt);
+            OWN(comparison) c = compare(&a, &b, opt);
             assert_true(c.skew_limited == (skewed == 1));
             if (skewed) {
                 assert_int_equal(c.verdict, VERDICT_INCONCLUSIVE);
@@ -447,7 +443,7 @@ TEST(test_skew_guard)
  * least up to the image, of which 8/16 standard errors are nothing. */
 TEST(test_harmless_by_luck)
 {
-    MOMENTS a = new_moments(16, 16, "sample"), b = new_moments(16, 16, "exact");
+    OWN(moments) a = new_moments(16, 16, "sample"), b = new_moments(16, 16, "exact");
     const double n = 1000, v = 1e-4, scale = n * (n - 1) * (n - 2);
     constant(&b, 1, 1);
     for (int lucky = 0; lucky < 2; lucky++) {
@@ -456,7 +452,7 @@ TEST(test_harmless_by_luck)
             a.mean[3 * 100 + c] = 1 - 8 * sqrt(v);
             a.m3[3 * 100 + c] = 0.01 * v * sqrt(v) * scale;
         }
-        COMPARISON c = compare(&a, &b, (struct compare_options){1e-3, 0, 0, 8, 0});
+        OWN(comparison) c = compare(&a, &b, (struct compare_options){1e-3, 0, 0, 8, 0});
         assert_int_equal(c.verdict, lucky ? VERDICT_NOTHING_FOUND : VERDICT_DIFFERENT);
         assert_true(lucky || (c.worst.width == 1 &&
                               c.worst.log10_p > log10(2) + log10(gsl_cdf_ugaussian_Q(8))));
@@ -499,7 +495,7 @@ TEST(test_all_alike_by_luck)
     struct err e;
     int alarms = 0;
     for (int i = 0; i < 10; i++) {
-        struct moments a = survivors(16, 1, &seed), b = others(&seed);
+        OWN(moments) a = survivors(16, 1, &seed), b = others(&seed);
         MUST(compare_moments(&a, &b, &o, &c, &e));
         alarms += c.verdict == VERDICT_DIFFERENT;
         comparison_free(&c);
@@ -509,15 +505,12 @@ TEST(test_all_alike_by_luck)
             assert_int_equal(c.verdict, VERDICT_DIFFERENT);
             comparison_free(&c);
             moments_free(&bright);
-            struct moments exact = new_moments(32, 32, "exact");
+            OWN(moments) exact = new_moments(32, 32, "exact");
             constant(&exact, 1 / 0.95, 1);
             MUST(compare_moments(&exact, &b, &o, &c, &e));
             assert_int_equal(c.verdict, VERDICT_DIFFERENT);
             comparison_free(&c);
-            moments_free(&exact);
         }
-        moments_free(&a);
-        moments_free(&b);
     }
     assert_int_equal(alarms, 0);
 }
@@ -526,18 +519,18 @@ TEST(test_all_alike_by_luck)
  * their ratio of radiance. And a moderately skewed interval is widened, never narrowed. */
 TEST(test_skewed_tile)
 {
-    MOMENTS a = new_moments(8, 8, "sample"), b = new_moments(8, 8, "exact");
+    OWN(moments) a = new_moments(8, 8, "sample"), b = new_moments(8, 8, "exact");
     const double n = 1000, v = 1e-6;
     double m2 = v * n * (n - 1);
     constant(&b, 1, 1);
     set_all(&a, n, 1, m2, 0);
     struct compare_options opt = {1e-3, 0.01, 0.02, 4, 0};
-    COMPARISON plain = compare(&a, &b, opt);
+    OWN(comparison) plain = compare(&a, &b, opt);
     for (int y = 0; y < 4; y++)
         for (int x = 0; x < 4; x++)
             for (int c = 0; c < 3; c++)
                 a.m3[3 * (8 * y + x) + c] = 0.05 * v * sqrt(v) * n * (n - 1) * (n - 2);
-    COMPARISON skewed = compare(&a, &b, opt);
+    OWN(comparison) skewed = compare(&a, &b, opt);
     assert_true(!skewed.skew_limited && !plain.skew_limited);
     assert_int_equal(skewed.verdict, VERDICT_EQUIVALENT);
     double g = 0.05 / 4, x = 3.09; /* of the tile: 16 k3/(16 v)^1.5; x of alpha = 1e-3 */
@@ -550,7 +543,7 @@ TEST(test_skewed_tile)
     /* Seven times as skewed: |g| x = 0.0875 x 4 is beyond 0.3. The image: 4 times the unit, so 4 times the MDB. */
     for (size_t i = 0; i < 3 * 64; i++)
         a.m3[i] *= 7;
-    COMPARISON more = compare(&a, &b, opt);
+    OWN(comparison) more = compare(&a, &b, opt);
     assert_true(more.skew_limited && more.global[0].ci_valid);
     assert_near(more.mdb_tile, 4 * more.mdb_global, 1e-6);
 }
@@ -559,7 +552,7 @@ TEST(test_skewed_tile)
  * B and 0.0004 in A, beside 0.5: mean 0.25, unit 0.0125, so 3.2 %. */
 TEST(test_floor)
 {
-    MOMENTS a = new_moments(8, 8, "exact"), b = new_moments(8, 8, "exact");
+    OWN(moments) a = new_moments(8, 8, "exact"), b = new_moments(8, 8, "exact");
     constant(&a, 0.5, 1);
     constant(&b, 0.5, 1);
     for (int p = 0; p < 64; p++)
@@ -583,14 +576,14 @@ TEST(test_floor)
  * margin. */
 TEST(test_margin_between)
 {
-    MOMENTS a = new_moments(16, 16, "exact"), b = new_moments(16, 16, "exact");
+    OWN(moments) a = new_moments(16, 16, "exact"), b = new_moments(16, 16, "exact");
     constant(&b, 1, 1);
     for (int over = 0; over < 2; over++) {
         constant(&a, 1, 1);
         for (int p = 0; p < 256; p++)
             for (int c = 0; p % 16 < 8 && p / 16 < 8 && c < 3; c++)
                 a.mean[3 * p + c] = over ? 1.021 : 1.019;
-        COMPARISON c = compare(&a, &b, (struct compare_options){1e-3, 0.01, 0.03, 4, 0});
+        OWN(comparison) c = compare(&a, &b, (struct compare_options){1e-3, 0.01, 0.03, 4, 0});
         assert_int_equal(c.verdict, over ? VERDICT_DIFFERENT : VERDICT_EQUIVALENT);
         if (over) {
             assert_near(c.worst.margin, 0.02, 1e-12);
@@ -604,7 +597,7 @@ TEST(test_margin_between)
  * factor leaves most INCONCLUSIVE. Normal law sd 0.3, n = 8 on 16 x 16, margins 2 % and 10 %. */
 TEST(test_extra_factor)
 {
-    MOMENTS a = new_moments(16, 16, "sample"), b = new_moments(16, 16, "sample");
+    OWN(moments) a = new_moments(16, 16, "sample"), b = new_moments(16, 16, "sample");
     struct compare_options opt = {1e-3, 0.02, 0.1, 8, 0};
     uint64_t seed = 21;
     simulate(&a, LAW_NORMAL, 1, 8, true, &seed);
@@ -634,13 +627,13 @@ TEST(test_extra_factor)
  * sqrt(512)/256 = 0.088; x is 6.55 at 0.44e-6 over at most 4 x 1365 tests, and 1.65 for the 95 %. */
 TEST(test_nothing_found)
 {
-    MOMENTS a = new_moments(32, 32, "sample"), b = new_moments(32, 32, "replicate");
+    OWN(moments) a = new_moments(32, 32, "sample"), b = new_moments(32, 32, "replicate");
     set_all(&a, 101, 1, 10100, 0);
     set_all(&b, 101, 1, 10110, 0);
     for (int i = 0; i < 3 * 32 * 32; i++)
         if (i / 3 % 32 < 16 && i / 3 / 32 < 16)
             a.mean[i] = 0.7;
-    COMPARISON c = compare(&a, &b, (struct compare_options){1e-6, 0, 0, 16, 0});
+    OWN(comparison) c = compare(&a, &b, (struct compare_options){1e-6, 0, 0, 16, 0});
     assert_int_equal(c.verdict, VERDICT_NOTHING_FOUND);
     assert_true(c.mdb_tile > 0.3 && c.mdb_tile < 8.3 * 0.088);
     char image[32], tile[32], wanted[256];
@@ -648,7 +641,7 @@ TEST(test_nothing_found)
              region_mdb_text(c.mdb_global, image), region_mdb_text(c.mdb_tile, tile));
     assert_non_null(strstr(c.reason, wanted));
     /* 1 % of the image needs (3.1 0.044/0.01)^2 = 190 times the samples: more than is said in numbers. */
-    COMPARISON d = compare(&a, &b, (struct compare_options){1e-3, 0.01, 0.9, 16, 0});
+    OWN(comparison) d = compare(&a, &b, (struct compare_options){1e-3, 0.01, 0.9, 16, 0});
     assert_int_equal(d.verdict, VERDICT_INCONCLUSIVE);
     assert_true(d.extra_factor == 100);
     char more[128];
@@ -675,7 +668,7 @@ TEST(test_margin_of_variance)
         {1, 0.5, false, true, VERDICT_INCONCLUSIVE, "could not be tested, as a side has none"},
     };
     for (size_t i = 0; i < COUNT(cases); i++) {
-        MOMENTS a = new_moments(16, 16, "sample"), b = new_moments(16, 16, "sample");
+        OWN(moments) a = new_moments(16, 16, "sample"), b = new_moments(16, 16, "sample");
         uint64_t seed = 3;
         set_all(&b, 101, 1, 1e-4, 0);
         set_all(&a, 101, 1, cases[i].times * 1e-4, 0);
@@ -689,8 +682,8 @@ TEST(test_margin_of_variance)
             constant(&b, 1, 1);
             strcpy(b.unit, "exact");
         }
-        COMPARISON c =
-            compare(&a, &b, (struct compare_options){1e-3, 0.1, 0.4, 16, cases[i].margin});
+        OWN(comparison)
+        c = compare(&a, &b, (struct compare_options){1e-3, 0.1, 0.4, 16, cases[i].margin});
         print_message("%s: %s\n", verdict_name(c.verdict), c.reason);
         assert_int_equal(c.verdict, cases[i].verdict);
         assert_non_null(strstr(c.reason, cases[i].says));
@@ -700,14 +693,14 @@ TEST(test_margin_of_variance)
 /* A channel swap that keeps luminance: caught in R, G and B. */
 TEST(test_channels)
 {
-    MOMENTS a = new_moments(8, 8, "exact"), b = new_moments(8, 8, "exact");
+    OWN(moments) a = new_moments(8, 8, "exact"), b = new_moments(8, 8, "exact");
     constant(&a, 1, 1);
     constant(&b, 1, 1);
     for (int p = 0; p < 64; p++) {
         a.mean[3 * p] = 1 + 0.1 / 0.2126;
         a.mean[3 * p + 1] = 1 - 0.1 / 0.7152;
     }
-    COMPARISON c = compare(&a, &b, (struct compare_options){1e-3, 0.01, 0.02, 4, 0});
+    OWN(comparison) c = compare(&a, &b, (struct compare_options){1e-3, 0.01, 0.02, 4, 0});
     assert_near(c.global[3].difference, 0, 1e-12);
     assert_int_equal(c.verdict, VERDICT_DIFFERENT);
     assert_true(c.worst.channel < 3);
@@ -715,7 +708,7 @@ TEST(test_channels)
 
 static void expect(const struct moments *b, struct compare_options opt, const char *line)
 {
-    MOMENTS a = new_moments(4, 4, "sample");
+    OWN(moments) a = new_moments(4, 4, "sample");
     struct comparison c;
     struct err e = {"untouched"};
     set_all(&a, 64, 1, 0.5, 0);
@@ -731,7 +724,7 @@ TEST(test_hygiene)
 {
     const struct compare_options right = {1e-3, 0.01, 0.02, 2, 0};
     struct compare_options opt = right;
-    MOMENTS b = new_moments(4, 4, "replicate"), tall = new_moments(4, 8, "replicate");
+    OWN(moments) b = new_moments(4, 4, "replicate"), tall = new_moments(4, 8, "replicate");
     const struct {
         double *at, value;
         const char *line;

@@ -51,7 +51,7 @@ static struct null_result run_null(const struct null_case *k, uint64_t seed, dou
             simulate(&b, k->law, 1, k->n_b, k->grey, &seed);
         else
             constant(&b, 1, 1);
-        COMPARISON c = compare(&a, &b, (struct compare_options){alpha, 0, 0, k->tile, 0});
+        OWN(comparison) c = compare(&a, &b, (struct compare_options){alpha, 0, 0, k->tile, 0});
         bool naive = false;
         for (int t = 0; t < tiles; t++) {
             naive = naive || fabs(c.tile_t[t]) > level;
@@ -130,14 +130,14 @@ TEST(test_p_uniform)
 TEST(test_power)
 {
     enum { CLAIMS = 1000 };
-    MOMENTS a = new_moments(16, 16, "sample"), b = new_moments(16, 16, "replicate");
+    OWN(moments) a = new_moments(16, 16, "sample"), b = new_moments(16, 16, "replicate");
     struct compare_options opt = {alpha, 0, 0, 4, 0};
     uint64_t seed = 77;
     double mdb = 0;
     for (int i = 0; i < 20; i++) {
         simulate(&a, LAW_NORMAL, 1, 16, true, &seed);
         simulate(&b, LAW_NORMAL, 1, 16, true, &seed);
-        COMPARISON c = compare(&a, &b, opt);
+        OWN(comparison) c = compare(&a, &b, opt);
         mdb += c.mdb_global / 20;
     }
     int image[2] = {0}, verdict[2] = {0};
@@ -147,7 +147,7 @@ TEST(test_power)
             simulate(&b, LAW_NORMAL, 1, 16, true, &seed);
             for (size_t p = 0; p < 3 * 256; p++)
                 a.mean[p] += half ? mdb / 2 : mdb;
-            COMPARISON c = compare(&a, &b, opt);
+            OWN(comparison) c = compare(&a, &b, opt);
             const struct statistic *s = &c.statistic[STATISTIC_IMAGE];
             image[half] += c.global[3].log10_p <= log10(opt.alpha * s->share / s->num_tests);
             verdict[half] += c.verdict == VERDICT_DIFFERENT;
@@ -169,7 +169,7 @@ TEST(test_power)
 TEST(test_tile_power)
 {
     enum { CLAIMS = 1000, N = 128 };
-    MOMENTS a = new_moments(16, 16, "sample"), b = new_moments(16, 16, "sample");
+    OWN(moments) a = new_moments(16, 16, "sample"), b = new_moments(16, 16, "sample");
     struct compare_options opt = {.alpha = alpha, .tile = 4};
     uint64_t seed = 78;
     double mdb = 0;
@@ -181,7 +181,7 @@ TEST(test_tile_power)
             for (int p = 0; half >= 0 && p < 256; p++)
                 for (int c = 0; p % 16 < 4 && p / 16 < 4 && c < 3; c++)
                     a.mean[3 * p + c] += half ? mdb / 2 : mdb;
-            COMPARISON c = compare(&a, &b, opt);
+            OWN(comparison) c = compare(&a, &b, opt);
             const struct statistic *s = &c.statistic[STATISTIC_PYRAMID];
             /* Luminance of grey is one of its channels: the tile's t of any is the same. */
             double log10_p = stats_t_log10_p(c.tile_t[0], 16 * 2 * (N - 1));
@@ -215,7 +215,7 @@ static struct verdict_rate rate_with_bias(double bias, bool one_tile, bool grey,
             if (!one_tile || (p % 16 < opt.tile && p / 16 < opt.tile))
                 for (int c = 0; c < 3; c++)
                     a.mean[3 * p + c] += bias;
-        COMPARISON c = compare(&a, &b, opt);
+        OWN(comparison) c = compare(&a, &b, opt);
         r.equivalent += c.verdict == VERDICT_EQUIVALENT;
         r.different += c.verdict == VERDICT_DIFFERENT;
         r.inside +=

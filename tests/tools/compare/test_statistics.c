@@ -83,14 +83,15 @@ TEST(test_sizes)
     fill_scene(truth, SIDE, 0.7);
     for (size_t i = 0; i < COUNT(cases); i++) {
         const struct size_case *k = &cases[i];
-        MOMENTS a = new_moments(SIDE, SIDE, "sample");
-        MOMENTS b = new_moments(SIDE, SIDE, k->n_b > 0 ? "sample" : "exact");
+        OWN(moments) a = new_moments(SIDE, SIDE, "sample");
+        OWN(moments) b = new_moments(SIDE, SIDE, k->n_b > 0 ? "sample" : "exact");
         int wrong[NUM_STATISTICS] = {0}, tested[NUM_STATISTICS] = {0}, known = 0, missed = 0;
         uint64_t seed = 4000 + i;
         for (int claim = 0; claim < CLAIMS; claim++) {
             render(&a, k->law, truth, k->n_a, k->grey, &seed);
             render(&b, k->law, truth, k->n_b, k->grey, &seed);
-            COMPARISON c = compare(
+            OWN(comparison)
+            c = compare(
                 &a, &b,
                 (struct compare_options){.alpha = 0.01, .tile = 4, .margin_variance = 1e-9});
             for (int s = 0; s < NUM_STATISTICS; s++) {
@@ -130,7 +131,7 @@ static double noncentral_q(double x, double k, double lambda)
 TEST(test_dense_power)
 {
     enum { SIDE = 8, N = 1024, CLAIMS = 400 };
-    MOMENTS a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
+    OWN(moments) a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
     const double size = 1.06, se = 0.3 * sqrt(2.0 / N);
     uint64_t seed = 51, coin = 7;
     int found[2] = {0}, pyramid = 0;
@@ -143,8 +144,7 @@ TEST(test_dense_power)
             simulate(&b, LAW_NORMAL, 1, N, true, &seed);
             for (int p = 0; off && p < 3 * SIDE * SIDE; p++)
                 a.mean[p] += sign[p / 3] * size * se;
-            struct comparison c =
-                compare(&a, &b, (struct compare_options){.alpha = 0.01, .tile = 4});
+            OWN(comparison) c = compare(&a, &b, (struct compare_options){.alpha = 0.01, .tile = 4});
             const struct statistic *s = &c.statistic[STATISTIC_CHI_SQUARE];
             level = 0.01 * s->share;
             assert_int_equal(s->num_tests, 6);
@@ -157,7 +157,6 @@ TEST(test_dense_power)
                 assert_int_equal(c.verdict, VERDICT_DIFFERENT);
                 assert_non_null(strstr(c.reason, "together"));
             }
-            comparison_free(&c);
         }
     double x = gsl_cdf_chisq_Qinv(level / 6, SIDE * SIDE);
     double expected = noncentral_q(x, SIDE * SIDE, SIDE * SIDE * size * size);
@@ -177,7 +176,7 @@ TEST(test_dense_power)
 TEST(test_dense_margin)
 {
     enum { SIDE = 16, N = 256, CLAIMS = 500 };
-    MOMENTS a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
+    OWN(moments) a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
     uint64_t seed = 61, coin = 7;
     int found[2] = {0};
     double sign[SIDE * SIDE];
@@ -190,7 +189,8 @@ TEST(test_dense_margin)
             a.mean[p] += 0.05 * sign[p / 3];
         for (int narrow = 0; narrow < 2; narrow++) {
             double margin = narrow ? 0.01 : 0.05;
-            COMPARISON c = compare(
+            OWN(comparison)
+            c = compare(
                 &a, &b,
                 (struct compare_options){
                     .alpha = 0.01, .tile = 4, .margin_global = margin, .margin_tile = margin});
@@ -242,7 +242,7 @@ TEST(test_names)
         "tint", "a quarter"};
     /* clang-format on */
     static double truth[3 * SIDE * SIDE], wrong[3 * SIDE * SIDE];
-    MOMENTS a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
+    OWN(moments) a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
     uint64_t seed = 71;
     fill_scene(truth, SIDE, 1);
     for (int bug = 0; bug < 17; bug++) {
@@ -260,8 +260,7 @@ TEST(test_names)
         for (int i = 0; i < CLAIMS; i++) {
             render(&a, LAW_NORMAL, wrong, N, true, &seed);
             render(&b, LAW_NORMAL, truth, N, true, &seed);
-            struct comparison c =
-                compare(&a, &b, (struct compare_options){.alpha = 1e-3, .tile = 8});
+            OWN(comparison) c = compare(&a, &b, (struct compare_options){.alpha = 1e-3, .tile = 8});
             MUST(hint_add(&a, &b, &c, &e));
             if (i == 0)
                 print_message("%-28s %s\n", name[bug], c.reason);
@@ -272,7 +271,6 @@ TEST(test_names)
                 assert_non_null(strstr(c.reason, wanted));
             else
                 assert_null(strstr(c.reason, "looks like"));
-            comparison_free(&c);
         }
     }
 }
@@ -289,7 +287,7 @@ TEST(test_amounts)
     const double expected[3] = {s, 3, 3};
     static const char *const name[3] = {"shift by x", "scale", "offset"};
     static double truth[3 * SIDE * SIDE], moved[3 * SIDE * SIDE];
-    MOMENTS a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
+    OWN(moments) a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
     uint64_t seed = 81;
     for (int kind = 0; kind < 3; kind++) {
         for (int i = 0; i < 3 * SIDE * SIDE; i++) {
@@ -308,15 +306,13 @@ TEST(test_amounts)
                 a.mean[p] += moved[p] - 1;
                 b.mean[p] += truth[p] - 1;
             }
-            struct comparison c =
-                compare(&a, &b, (struct compare_options){.alpha = 0.01, .tile = 8});
+            OWN(comparison) c = compare(&a, &b, (struct compare_options){.alpha = 0.01, .tile = 8});
             MUST(hint_add(&a, &b, &c, &e));
             if (c.hint.name != NULL && strcmp(c.hint.name, name[kind]) == 0) {
                 named++;
                 sum += c.hint.amount;
                 squares += c.hint.amount * c.hint.amount;
             }
-            comparison_free(&c);
         }
         double mean = sum / named, sd = sqrt(squares / named - mean * mean);
         print_message("%s: %.4f +- %.4f, expected %.4f, named %d of %d\n", name[kind], mean, sd,
@@ -336,7 +332,7 @@ TEST(test_directed_power)
     enum { SIDE = 16, N = 64, CLAIMS = 400 };
     const double k = 2 * pi / SIDE, s = 0.1;
     static double truth[3 * SIDE * SIDE], moved[3 * SIDE * SIDE];
-    MOMENTS a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
+    OWN(moments) a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
     uint64_t seed = 91;
     int found[2] = {0};
     double share = 0, t2 = 0;
@@ -353,14 +349,12 @@ TEST(test_directed_power)
         for (int i = 0; i < CLAIMS; i++) {
             render(&a, LAW_NORMAL, moved, N, true, &seed);
             render(&b, LAW_NORMAL, truth, N, true, &seed);
-            struct comparison c =
-                compare(&a, &b, (struct compare_options){.alpha = 0.01, .tile = 8});
+            OWN(comparison) c = compare(&a, &b, (struct compare_options){.alpha = 0.01, .tile = 8});
             const struct statistic *d = &c.statistic[STATISTIC_MATCHED_FILTER];
             share = d->share;
             tests = d->num_tests;
             assert_int_equal(tests, NUM_ERROR_MODES);
             found[off] += d->log10_p <= log10(0.01 * share);
-            comparison_free(&c);
         }
     }
     double x = gsl_cdf_ugaussian_Qinv(0.01 * share / tests / 2), t = sqrt(t2);
@@ -379,7 +373,7 @@ TEST(test_directed_margin)
 {
     enum { SIDE = 16, N = 64, CLAIMS = 500 };
     static double truth[3 * SIDE * SIDE], wrong[3 * SIDE * SIDE];
-    MOMENTS a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
+    OWN(moments) a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
     struct compare_options opt = {
         .alpha = 0.01, .tile = 4, .margin_global = 0.05, .margin_tile = 0.05};
     uint64_t seed = 101;
@@ -391,7 +385,7 @@ TEST(test_directed_margin)
                 wrong[p] = (twice ? 1.1 : 1.05) * truth[p];
             render(&a, LAW_NORMAL, wrong, N, true, &seed);
             render(&b, LAW_NORMAL, truth, N, true, &seed);
-            COMPARISON c = compare(&a, &b, opt);
+            OWN(comparison) c = compare(&a, &b, opt);
             found[twice] += c.statistic[STATISTIC_MATCHED_FILTER].log10_p <= -2;
         }
     print_message("scale at the margin: found %d of %d, at twice %d\n", found[0], CLAIMS, found[1]);
@@ -407,7 +401,7 @@ TEST(test_directed_margin)
 TEST(test_variance_ratio)
 {
     enum { SIDE = 32, N = 16, CLAIMS = 1000 };
-    MOMENTS a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
+    OWN(moments) a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
     static double truth[3 * SIDE * SIDE];
     uint64_t seed = 111;
     int known = 0, missed = 0, edge = 0, found = 0, level = 0, tested = 0;
@@ -479,8 +473,8 @@ TEST(test_noise_shared)
     enum { SIDE = 24 };
     static const enum law law[] = {LAW_NORMAL,  LAW_EXPONENTIAL, LAW_BLACK, LAW_RARE,
                                    LAW_FIREFLY, LAW_LOGNORMAL,   LAW_PARETO};
-    MOMENTS a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
-    MOMENTS own = new_moments(SIDE, SIDE, "sample");
+    OWN(moments) a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
+    OWN(moments) own = new_moments(SIDE, SIDE, "sample");
     uint64_t seed = 77;
     for (size_t l = 0; l < COUNT(law); l++)
         for (int n = 3; n <= 48; n *= 4)
@@ -511,7 +505,7 @@ TEST(test_noise_shared)
 TEST(test_shared_seeds)
 {
     enum { SIDE = 8, N = 16 };
-    MOMENTS a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
+    OWN(moments) a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
     struct compare_options opt = {.alpha = 1e-3, .tile = 4};
     struct comparison c;
     struct err e;
@@ -558,7 +552,7 @@ TEST(test_shared_seeds)
 TEST(test_small_alpha)
 {
     enum { SIDE = 16, N = 121, CLAIMS = 500 };
-    MOMENTS a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
+    OWN(moments) a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
     struct compare_options opt = {.alpha = 1e-9, .tile = 4};
     uint64_t seed = 131;
     simulate(&a, LAW_NORMAL, 1, N, true, &seed);
@@ -605,7 +599,7 @@ TEST(test_cost)
 #else
     const double seconds = 2, mib = 200;
 #endif
-    MOMENTS a = new_moments(512, 512, "replicate"), b = new_moments(512, 512, "replicate");
+    OWN(moments) a = new_moments(512, 512, "replicate"), b = new_moments(512, 512, "replicate");
     uint64_t seed = 141;
     simulate(&a, LAW_EXPONENTIAL, 1, 8, true, &seed);
     simulate(&b, LAW_EXPONENTIAL, 1, 8, true, &seed);

@@ -4,6 +4,7 @@
 #include "renderer/base/fs.h"
 #include "tools/converge/depth_ladder.h"
 #include "tests/support/suite_files.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 #include "tools/plots/plot_convergence.h"
 #include "tools/results/convergence_results.h"
@@ -74,8 +75,8 @@ TEST(furnace)
 
 static htmlDocPtr page_of(const char *json)
 {
-    json_t *depths = json_loads(json, 0, NULL);
-    char *text = NULL;
+    json_auto_t *depths = json_loads(json, 0, NULL);
+    OWN_TEXT text = NULL;
     size_t size;
     struct err e = {""};
     FILE *f = open_memstream(&text, &size);
@@ -86,8 +87,6 @@ static htmlDocPtr page_of(const char *json)
     htmlDocPtr doc =
         htmlReadMemory(text, (int)size, "x", "utf-8", HTML_PARSE_NOERROR | HTML_PARSE_NOWARNING);
     assert_non_null(doc);
-    free(text);
-    json_decref(depths);
     return doc;
 }
 
@@ -144,9 +143,8 @@ TEST(bad_ladders)
     };
     for (size_t i = 0; i < COUNT(bad); i++) {
         struct err e = {""};
-        json_t *j = json_loads(bad[i], 0, NULL);
+        json_auto_t *j = json_loads(bad[i], 0, NULL);
         assert_non_null(j);
         REFUSES(convergence_results_check_depths(j, "file: scene", &e), "file: scene: 'depths'");
-        json_decref(j);
     }
 }

@@ -5,6 +5,7 @@
 #include "tools/diagnose/diagnose.h"
 #include "catalogue_write.h"
 #include "tests/support/simulate.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #include <gsl/gsl_randist.h>
@@ -137,7 +138,7 @@ TEST(test_a_damaged_catalogue_is_refused)
 {
     struct fixture *f = *state;
     struct err e = {""};
-    struct catalogue c;
+    OWN(catalogue) c;
     char name[160];
     const char *dir = test_path("damaged");
     assert_true(fs_make_dirs(dir, &e));
@@ -151,7 +152,6 @@ TEST(test_a_damaged_catalogue_is_refused)
     snprintf(name, sizeof name, "%s.exr", f->c.view[1].name);
     copy(CATALOGUE, name, dir, -1);
     assert_true(catalogue_read(dir, &c, &e));
-    catalogue_free(&c);
 }
 
 /* ---- sights */
@@ -197,10 +197,9 @@ TEST(test_an_average_of_sights)
     struct signature s[2];
     uint64_t seed = 5;
     for (int k = 0; k < 2; k++) {
-        struct moments m = new_moments(16, 16, "sample");
+        OWN(moments) m = new_moments(16, 16, "sample");
         simulate(&m, LAW_NORMAL, 1, 50, true, &seed);
         assert_true(signature_of(&m, 16, 50, &s[k], &e));
-        moments_free(&m);
     }
     struct signature a = signature_average(s, 2);
     for (int i = 0; i < SIGNATURE_VALUES; i += 101) {

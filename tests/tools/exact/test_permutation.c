@@ -3,6 +3,7 @@
 #include "tests/support/simulate.h"
 
 #include "tools/exact/permutation.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #include <gsl/gsl_cdf.h>
@@ -75,7 +76,7 @@ TEST(test_by_enumeration)
 {
     uint64_t seed = 3;
     for (int run = 0; run < 20; run++) {
-        struct replicate_dir a = new_renders(3, 2, 2), b = new_renders(3, 2, 2);
+        OWN(replicate_dir) a = new_renders(3, 2, 2), b = new_renders(3, 2, 2);
         double v[6][4];
         paint(&a, NORMAL, 1, &seed);
         paint(&b, NORMAL, run % 2 ? 1 : 2, &seed);
@@ -96,8 +97,6 @@ TEST(test_by_enumeration)
         assert_true(fabs(p.smallest_p - 0.1) < 1e-12); /* 2/C(6,3) */
         assert_true(fabs(fabs(p.t) - observed) < 1e-4 * observed);
         assert_int_equal(p.num_regions, 4 * 5);
-        replicate_dir_free(&a);
-        replicate_dir_free(&b);
     }
 }
 
@@ -113,7 +112,7 @@ TEST(test_smallest)
     assert_int_equal(permutation_needed(5e-6, 2), 11);
     assert_int_equal(permutation_needed(1e-6, 2), 0);
     uint64_t seed = 9;
-    struct replicate_dir a = new_renders(4, 4, 4), b = new_renders(4, 4, 4);
+    OWN(replicate_dir) a = new_renders(4, 4, 4), b = new_renders(4, 4, 4);
     paint(&a, NORMAL, 1, &seed);
     paint(&b, NORMAL, 5, &seed);
     struct permutation p = test_pair(&a, &b, (struct permutation_options){1e-3, 0, 1});
@@ -124,15 +123,13 @@ TEST(test_smallest)
     assert_non_null(strstr(p.reason, "--again"));
     p = test_pair(&a, &b, (struct permutation_options){0.03, 0, 1});
     assert_int_equal(p.verdict, VERDICT_DIFFERENT);
-    replicate_dir_free(&a);
-    replicate_dir_free(&b);
 }
 
 /* p <= alpha in how many of `runs` pairs from one law. */
 static int count_rejected(enum law_of_images law, double scale, double alpha, int runs,
                           uint64_t seed)
 {
-    struct replicate_dir a = new_renders(5, 8, 8), b = new_renders(5, 8, 8);
+    OWN(replicate_dir) a = new_renders(5, 8, 8), b = new_renders(5, 8, 8);
     int rejected = 0;
     for (int i = 0; i < runs; i++) {
         paint(&a, law, scale, &seed);
@@ -140,8 +137,6 @@ static int count_rejected(enum law_of_images law, double scale, double alpha, in
         struct permutation p = test_pair(&a, &b, (struct permutation_options){alpha, 2, 1});
         rejected += p.p <= alpha;
     }
-    replicate_dir_free(&a);
-    replicate_dir_free(&b);
     return rejected;
 }
 
@@ -164,7 +159,7 @@ TEST(test_level)
 TEST(test_confirm)
 {
     uint64_t seed = 60;
-    struct replicate_dir a = new_renders(5, 8, 8), b = new_renders(5, 8, 8);
+    OWN(replicate_dir) a = new_renders(5, 8, 8), b = new_renders(5, 8, 8);
     struct permutation_options opt = {0.01, 2, 1};
     struct permutation first, second;
     struct err e;
@@ -189,8 +184,6 @@ TEST(test_confirm)
     paint(&b, NORMAL, 1, &seed);
     assert_true(permutation_confirm(&first, &a, &b, &opt, &second, &e));
     assert_int_equal(second.verdict, VERDICT_INCONCLUSIVE);
-    replicate_dir_free(&a);
-    replicate_dir_free(&b);
 }
 
 /* A tile that is off by its MDB is found with about 95 %, one by half of it hardly ever: of 60 each, below 50 has less
@@ -198,7 +191,7 @@ TEST(test_confirm)
 TEST(test_tile_mdb)
 {
     uint64_t seed = 91;
-    struct replicate_dir a = new_renders(7, 8, 8), b = new_renders(7, 8, 8);
+    OWN(replicate_dir) a = new_renders(7, 8, 8), b = new_renders(7, 8, 8);
     int found[2] = {0};
     for (int i = 0; i < 120; i++) {
         paint(&a, NORMAL, 1, &seed);
@@ -214,8 +207,6 @@ TEST(test_tile_mdb)
     }
     print_message("a tile off by its MDB: found %d of 60, by half of it %d\n", found[0], found[1]);
     assert_true(found[0] >= 50 && found[1] < 45);
-    replicate_dir_free(&a);
-    replicate_dir_free(&b);
 }
 
 /* 10 a side are 184 756 labellings, 11 are 705 432 and drawn at random. Both must agree on what is far out,
@@ -223,7 +214,7 @@ TEST(test_tile_mdb)
 TEST(test_random_labellings)
 {
     uint64_t seed = 70;
-    struct replicate_dir a = new_renders(11, 2, 2), b = new_renders(11, 2, 2);
+    OWN(replicate_dir) a = new_renders(11, 2, 2), b = new_renders(11, 2, 2);
     paint(&a, NORMAL, 1, &seed);
     paint(&b, NORMAL, 1.5, &seed);
     struct permutation p = test_pair(&a, &b, (struct permutation_options){1e-3, 2, 1});
@@ -233,8 +224,6 @@ TEST(test_random_labellings)
     assert_true(fabs(steps - round(steps)) < 1e-6 && steps >= 1);
     assert_true(fabs(p.smallest_p - 1.0 / 200001) < 1e-15);
     assert_int_equal(p.verdict, VERDICT_DIFFERENT);
-    replicate_dir_free(&a);
-    replicate_dir_free(&b);
 }
 
 TEST(test_refused)

@@ -6,6 +6,7 @@
 #include "tools/compare/region.h"
 #include "tools/exact/sign_flip_score.h"
 #include "tools/validate/same_program.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #include <gsl/gsl_cdf.h>
@@ -139,7 +140,7 @@ TEST(test_scores_are_odd)
             q.b[3 * i + c] = p.a[3 * i + c];
         }
     }
-    struct sheet s = {.width = SIDE, .height = SIDE, .num = 1}, t = s;
+    OWN(sheet) s = {.width = SIDE, .height = SIDE, .num = 1}, t = s;
     struct err e;
     MUST(sheet_alloc(&s, &e) && sheet_alloc(&t, &e));
     for (int with_error = 0; with_error < 2; with_error++)
@@ -156,8 +157,6 @@ TEST(test_scores_are_odd)
                 for (int i = 0; i < SIDE * SIDE; i++)
                     assert_true(t.score[i] == (swapped[i] ? -1 : 1) * s.score[i]);
             }
-    sheet_free(&s);
-    sheet_free(&t);
 }
 
 /* H0 holds: 200 pairs of each law, of 1 and of 4 draws, at 5 %, against the one-sided bound at 99.9 %. At 1 draw most of the black

@@ -5,6 +5,7 @@
 #include "renderer/base/sha256.h"
 #include "tools/golden/approve.h"
 #include "tests/support/simulate.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 enum { SIDE = 64, REPLICATES = 16 };
@@ -58,18 +59,16 @@ static int teardown(void **state)
  * standard error of the image is 0.12 %, of a tile 0.5 %. */
 static void render(struct fixture *f, const char *dir, double scale, uint64_t seed)
 {
-    struct moments m = new_moments(f->scene.width, f->scene.height, "replicate");
+    OWN(moments) m = new_moments(f->scene.width, f->scene.height, "replicate");
     simulate(&m, LAW_NORMAL, scale, REPLICATES, true, &seed);
     m.spp = 4;
-    json_t *manifest = json_pack(
+    json_auto_t *manifest = json_pack(
         "{ss,ss,ss,ss,si,si,si,si,si,si,sI,ss,ss,s[I]}", "scene", "12_plane", "scene_sha256",
         f->scene.sha256, "engine", f->ref.engine, "unit", "replicate", "width", m.width, "height",
         m.height, "depth", 5, "replicates", REPLICATES, "spp", 4, "subgrid", 0, "seed",
         (json_int_t)seed, "version", "Blender 3.4.1", "key", "k", "seeds", (json_int_t)77);
     struct err e;
     MUST(golden_write(dir, "12_plane", f->ref.engine, &m, manifest, &e));
-    json_decref(manifest);
-    moments_free(&m);
 }
 
 static enum approval run(struct fixture *f)
@@ -137,9 +136,8 @@ static void assert_accepted(struct fixture *f, size_t count, const char *verdict
     golden_inspect(f->golden, &f->scene, &f->ref, &g);
     assert_int_equal(g.state, GOLDEN_CURRENT);
     golden_free(&g);
-    json_t *change = last_change(f, count);
+    json_auto_t *change = last_change(f, count);
     assert_string_equal(json_string_value(json_object_get(change, "verdict")), verdict);
-    json_decref(change);
 }
 
 TEST_WITH(a_new_one_has_to_be_called_new, setup, teardown)
@@ -188,7 +186,7 @@ TEST_WITH(other_seeds_are_accepted_with_their_effect, setup, teardown)
     assert_non_null(strstr(f->said, "difference "));
     assert_non_null(strstr(f->said, "smallest detectable: image "));
     assert_non_null(strstr(f->said, "stored    Blender 3.4.1, 1 seeds of seed "));
-    json_t *change = last_change(f, 1);
+    json_auto_t *change = last_change(f, 1);
     double d = json_number_value(json_object_get(change, "difference"));
     json_t *ci = json_object_get(change, "ci");
     /* Both means are 1 up to 0.12 %: five standard errors of their difference. */
@@ -197,7 +195,6 @@ TEST_WITH(other_seeds_are_accepted_with_their_effect, setup, teardown)
                 d < json_number_value(json_array_get(ci, 1)));
     assert_string_equal(
         json_string_value(json_object_get(json_object_get(change, "was"), "scene_sha256")), "abc");
-    json_decref(change);
 }
 
 TEST_WITH(a_difference_needs_a_reason, setup, teardown)
@@ -352,8 +349,8 @@ static void render_twice(struct fixture *f, const char *program, struct suite_sc
                                               .timeout_s = 600,
                                               .work_dir = f->dir,
                                               .share_dir = "reference"};
-        struct moments m = {0};
-        json_t *manifest = NULL;
+        OWN(moments) m = {0};
+        json_auto_t *manifest = NULL;
         struct err e;
         if (!reference_key(&scene, &ref, &opt, key[i], &e) ||
             !reference_render(&scene, &ref, &opt, &m, &manifest, &e) ||
@@ -362,8 +359,6 @@ static void render_twice(struct fixture *f, const char *program, struct suite_sc
         assert_string_equal(m.unit, "replicate");
         snprintf(exr, sizeof exr, "%s/%s/%s.exr", f->from, scene.name, ref.engine);
         assert_true(sha256_file(exr, hex[i], &e));
-        moments_free(&m);
-        json_decref(manifest);
     }
     assert_string_equal(hex[0], hex[1]);
     assert_string_equal(key[0], key[1]);

@@ -8,6 +8,7 @@
 #include "tools/grade/grade_checks.h"
 #include "tools/grade/rate_image.h"
 #include "tools/grade/stopping_rule.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #include <gsl/gsl_randist.h>
@@ -274,17 +275,15 @@ TEST(a_right_program_keeps_its_score)
     enum { RUNS = 100 };
     double most = 0;
     for (int k = 0; k < RUNS; k++) {
-        struct result r = equal(&none, SPP, 1e-5);
+        OWN(result) r = equal(&none, SPP, 1e-5);
         assert_true(r.share == 1);
         most = fmax(most, r.chance);
-        result_free(&r);
     }
     printf("largest chance of other points, of %d right images: %.2g\n", RUNS, most);
     assert_true(most < 1e-4);
     const struct bug near = {.scale = 1.03, .square = 1, .noise = 1};
-    struct result r = equal(&near, SPP, 1e-5);
+    OWN(result) r = equal(&near, SPP, 1e-5);
     assert_true(r.chance > 1e-4);
-    result_free(&r);
 }
 
 /* H0: the interval of a check misses a true 0 with at most alpha, here 5 %, over all channels and tiles. 400 images; by
@@ -294,7 +293,7 @@ TEST(a_right_image_keeps_its_points)
     enum { RUNS = 400 };
     int misses = 0, lost = 0, found = 0;
     for (int k = 0; k < RUNS; k++) {
-        struct result r = equal(&none, SPP, 0.05);
+        OWN(result) r = equal(&none, SPP, 0.05);
         bool miss = false;
         for (int c = 0; c < NUM_CHANNELS; c++)
             miss |= interval_distance(&r.agreement.image[c]) > 0;
@@ -302,7 +301,6 @@ TEST(a_right_image_keeps_its_points)
         misses += miss;
         lost += r.share < 1;
         assert_true(r.agreement.tiles >= 40);
-        result_free(&r);
     }
     if (misses > 34)
         fail_msg("%d of %d intervals miss the truth", misses, RUNS);
@@ -311,9 +309,8 @@ TEST(a_right_image_keeps_its_points)
     assert_int_equal(lost, 0);
     const struct bug bright = {.scale = 1.03, .square = 1, .noise = 1};
     for (int k = 0; k < 40; k++) {
-        struct result r = equal(&bright, SPP, 0.05);
+        OWN(result) r = equal(&bright, SPP, 0.05);
         found += interval_distance(&r.agreement.image[CHANNEL_LUMINANCE]) > 0;
-        result_free(&r);
     }
     assert_int_equal(found, 40);
 }
@@ -325,17 +322,15 @@ TEST(noise_is_not_bias)
     for (int i = 0; i < 3; i++) {
         struct bug b = none;
         b.noise = samples[i];
-        struct result r = equal(&b, SPP, 1e-5);
+        OWN(result) r = equal(&b, SPP, 1e-5);
         if (r.share < 1)
             fail_msg("samples x %g: %g points, %s", samples[i], r.share, r.seen);
         assert_true(fabs(log(r.agreement.kappa * samples[i])) < 0.3);
-        result_free(&r);
     }
     struct bug b = none;
     b.noise = 1.0 / 64;
-    struct result r = equal(&b, SPP, 1e-5);
+    OWN(result) r = equal(&b, SPP, 1e-5);
     assert_true(r.share < 1);
-    result_free(&r);
 }
 
 /* Rare bright samples, 200 times the third moment of an exponential law: g = 200 * 2/sqrt(64 * 256) = 3.1 of a tile's mean, and Bernstein's half
@@ -370,21 +365,19 @@ TEST(points_follow_bias_not_variance)
     for (size_t i = 0; i < COUNT(noise); i++) {
         int runs, most = 0;
         for (int k = 0; k < 12; k++) {
-            struct result r = buy(&none, noise[i], &runs);
+            OWN(result) r = buy(&none, noise[i], &runs);
             if (r.share < 1 || r.more > 0)
                 fail_msg("variance x %g, %d runs: %g of the points, %s", noise[i], runs, r.share,
                          r.seen);
             most = runs > most ? runs : most;
-            result_free(&r);
         }
         printf("variance x %g: at most %d runs\n", noise[i], most);
         assert_true(noise[i] > 1 || most == 1);
         for (int k = 0; k < 2; k++) {
-            struct result r = buy(k == 0 ? &bright : &dark, noise[i], &runs);
+            OWN(result) r = buy(k == 0 ? &bright : &dark, noise[i], &runs);
             if (r.share > 0 || r.more > 0)
                 fail_msg("variance x %g, bug %d: %g left after %d runs: %s", noise[i], k, r.share,
                          runs, r.seen);
-            result_free(&r);
         }
     }
 }
@@ -409,16 +402,13 @@ TEST(runs_that_share_samples_are_seen)
                 rgb8[1][i] = tone_map(TONE_CGL, v * (shared ? (a + b) / 2 : (b + c) / 2));
             }
         }
-        struct submitted_image one = submit(rgb8[0]), two = submit(rgb8[1]), right;
+        OWN(submitted_image) one = submit(rgb8[0]), two = submit(rgb8[1]), right;
         struct err e;
         MUST(submitted_image_from(&reference, &one, &right, &e));
         submitted_image_expect(&one, &reference, SPP);
         submitted_image_expect(&two, &reference, 2 * SPP);
         assert_true(difference_correlated(&one, &two, &right, use) == shared);
         assert_true(submitted_image_same(&one, &one) && !submitted_image_same(&one, &two));
-        submitted_image_free(&one);
-        submitted_image_free(&two);
-        submitted_image_free(&right);
     }
 }
 
@@ -464,10 +454,9 @@ TEST(bugs_cost_points)
         {"4 % too bright", {.scale = 1.04, .square = 1, .noise = 1}, 0.9},
     };
     for (size_t i = 0; i < COUNT(bugs); i++) {
-        struct result r = equal(&bugs[i].bug, SPP, 1e-5);
+        OWN(result) r = equal(&bugs[i].bug, SPP, 1e-5);
         if (r.share > bugs[i].most)
             fail_msg("%s: %g of the points are left: %s", bugs[i].name, r.share, r.seen);
-        result_free(&r);
     }
 }
 
@@ -478,10 +467,9 @@ TEST(a_copy_of_the_reference_is_seen)
     for (size_t i = 0; i < 3 * PIXELS; i++)
         rgb8[i] = tone_map(TONE_CGL, reference.mean[i]);
     struct submitted_image copy = submit(rgb8);
-    struct result out = run_check(a_rubric(CHECK_EQUAL, 1), &copy, 1e-5);
+    OWN(result) out = run_check(a_rubric(CHECK_EQUAL, 1), &copy, 1e-5);
     assert_true(out.share == 0);
     assert_non_null(strstr(out.flag, "copy"));
-    result_free(&out);
 }
 
 /* What is accepted: everything 1.2 times as bright. A program that does that loses nothing, one that has a dark square besides
@@ -545,10 +533,9 @@ TEST(a_watermark_is_masked)
             struct rubric *r = a_rubric(kind == 0 ? CHECK_EQUAL : CHECK_EXACT, 1);
             memcpy(r->mask, cases[k].mask, sizeof r->mask);
             struct submitted_image mark = submit_render(&cases[k].bug, SPP);
-            struct result out = run_check(r, &mark, 1e-5);
+            OWN(result) out = run_check(r, &mark, 1e-5);
             if ((out.share == 1) != cases[k].all)
                 fail_msg("case %zu: %g of the points: %s", k, out.share, out.seen);
-            result_free(&out);
         }
 }
 
@@ -698,11 +685,10 @@ TEST(growth_is_that_of_samples_alone)
         r->check[0].log_ratio = (struct margin){2.1, 3.2, true};
         for (int k = 0; k < 4; k++)
             image[k] = submit_render(&cases[i].bug, SPP);
-        struct result out = run_check_timed(r, image, cases[i].cpu_s, 1e-5);
+        OWN(result) out = run_check_timed(r, image, cases[i].cpu_s, 1e-5);
         if (out.share < cases[i].least || out.share > cases[i].most || out.more > 0 ||
             strstr(out.seen, cases[i].seen) == NULL)
             fail_msg("case %zu: %g of the points: %s", i, out.share, out.seen);
-        result_free(&out);
     }
 }
 

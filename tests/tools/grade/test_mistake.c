@@ -4,6 +4,7 @@
 #include "tools/grade/carried.h"
 #include "tools/grade/mistake.h"
 #include "bug_images.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 static struct bug_images of;
@@ -30,12 +31,11 @@ static struct submitted_images *right;
 
 static bool is_passed(const struct rubric_check *c)
 {
-    struct result result;
+    OWN(result) result;
     struct err e;
     MUST(grade_checks_run(&(struct grading){of.rubric, of.answers, right, 1e-5, NULL}, c, 0,
                           &result, &e));
     bool passed = result.share == 1;
-    result_free(&result);
     return passed;
 }
 

@@ -2,6 +2,7 @@
 #include "tools/gradebook/appeals.h"
 #include "tools/gradebook/grade_change.h"
 
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 static struct rubric *rubric;
@@ -51,13 +52,13 @@ static const json_t *member_of(const json_t *grade, const char *list, size_t i, 
 
 TEST(what_is_decided_counts)
 {
-    struct appeals a;
+    OWN(appeals) a;
     struct err e;
     char none[65], key[65];
     MUST(reads("# ID CHECK POINTS REASON\n\n  bob bounces 4.5 lost power,  twice \n"
                "\"Ada Lovelace\"\tfalloff 0 not hers\n",
                &a, &e));
-    json_t *grade = grade_of(4, 0);
+    json_auto_t *grade = grade_of(4, 0);
     appeals_apply(&a, rubric, grade);
     assert_near(json_number_value(json_object_get(grade, "points")), 8.5, 1e-12);
     assert_near(json_number_value(member_of(grade, "parts", 0, "points")), 4, 1e-12);
@@ -76,8 +77,6 @@ TEST(what_is_decided_counts)
     assert_string_equal(key, none);
     appeals_key(&a, "bob", key);
     assert_string_not_equal(key, none);
-    json_decref(grade);
-    appeals_free(&a);
 }
 
 TEST(mistakes_are_named_with_their_lines)

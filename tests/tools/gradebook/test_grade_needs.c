@@ -53,7 +53,7 @@ TEST(each_reason_is_said)
 TEST(all_reasons_are_in_one_line_as_far_as_it_reaches)
 {
     char said[40];
-    json_t *grade = with("wrong", json_string("two main()"));
+    json_auto_t *grade = with("wrong", json_string("two main()"));
     json_object_set_new(json_array_get(json_object_get(grade, "checks"), 0), "judged",
                         json_false());
     assert_true(grade_needs(grade, said, sizeof said));
@@ -63,5 +63,4 @@ TEST(all_reasons_are_in_one_line_as_far_as_it_reaches)
         assert_true(strlen(said) > 0 && strlen(said) < size);
         assert_memory_equal(said, "two main(); floor: not judged", strlen(said));
     }
-    json_decref(grade);
 }

@@ -60,8 +60,7 @@ static bool valid_objects(const json_t *array, const struct field *fields)
 {
     size_t i;
     json_t *v;
-    json_array_foreach(array, i, v)
-    {
+    json_array_foreach(array, i, v) {
         if (!valid_object(v, fields))
             return false;
     }
@@ -85,8 +84,7 @@ static bool valid_value(const json_t *v, enum kind kind)
     case BOARD: return valid_objects(v, board);
     case ANY: return true;
     case TEXTS:
-        json_array_foreach(v, i, each)
-        {
+        json_array_foreach(v, i, each) {
             if (!json_is_string(each))
                 return false;
         }
@@ -99,8 +97,7 @@ static bool valid_object(const json_t *object, const struct field *fields)
 {
     const char *name;
     json_t *v;
-    json_object_foreach((json_t *)object, name, v)
-    {
+    json_object_foreach((json_t *)object, name, v) {
         const struct field *f = fields;
         while (f->name != NULL && strcmp(f->name, name) != 0)
             f++;
@@ -205,16 +202,14 @@ static void every_file_has_documented_fields_only(void **state)
         fail_msg("%s", e.msg);
     json_decref(grades);
     for (int i = 0; i < 3; i++) {
-        json_t *root = results_of(ids[i]);
+        json_auto_t *root = results_of(ids[i]);
         assert_true(valid_results(root));
-        json_decref(root);
     }
     /* What Gradescope adds up is what was given, to a hundredth of a point. */
     json_t *root = results_of("ada"), *tests = json_object_get(root, "tests"), *t;
     double sum = 0, most = 0;
     size_t i;
-    json_array_foreach(tests, i, t)
-    {
+    json_array_foreach(tests, i, t) {
         sum += json_number_value(json_object_get(t, "score"));
         most += json_number_value(json_object_get(t, "max_score"));
     }
@@ -265,17 +260,15 @@ static void other_fields_and_values_are_rejected(void **state)
         "{\"score\": 1, \"leaderboard\": [{\"name\": \"n\", \"value\": 1, \"order\": \"asc\"}]}",
     };
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
-        json_t *root = json_loads(wrong[i], 0, NULL);
+        json_auto_t *root = json_loads(wrong[i], 0, NULL);
         assert_non_null(root);
         if (valid_results(root))
             fail_msg("not rejected: %s", wrong[i]);
-        json_decref(root);
     }
     for (size_t i = 0; i < sizeof right / sizeof *right; i++) {
-        json_t *root = json_loads(right[i], 0, NULL);
+        json_auto_t *root = json_loads(right[i], 0, NULL);
         if (!valid_results(root))
             fail_msg("rejected: %s", right[i]);
-        json_decref(root);
     }
 }
 
@@ -283,9 +276,8 @@ int main(int argc, char **argv)
 {
     /* A file of another program, say of run_autograder. */
     if (argc == 2) {
-        json_t *root = json_load_file(argv[1], 0, NULL);
+        json_auto_t *root = json_load_file(argv[1], 0, NULL);
         bool valid = valid_results(root);
-        json_decref(root);
         return valid ? 0 : 1;
     }
     const struct CMUnitTest tests[] = {

@@ -4,6 +4,7 @@
 #include "renderer/image/tone.h"
 #include "tools/images/tone_curve.h"
 #include "tools/gradebook/same_noise.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #include <gsl/gsl_randist.h>
@@ -160,7 +161,7 @@ TEST(copies_of_the_reference)
 {
     enum { OWN, BRIGHT_HALF, COPY, WITH_NOISE, RETOUCHED, HALF_OF_IT, LONGER, KINDS };
     static double factor[PIXELS], image[PIXELS];
-    struct moments twin;
+    OWN(moments) twin;
     struct err e;
     double bound = same_noise_bound(300 * 20.0, SAME_NOISE_ALPHA), least[KINDS], most[KINDS];
     int high = 0, found[KINDS] = {0};
@@ -204,7 +205,6 @@ TEST(copies_of_the_reference)
     assert_true(most[OWN] < bound && most[BRIGHT_HALF] < bound && most[LONGER] < bound);
     for (int kind = COPY; kind <= HALF_OF_IT; kind++)
         assert_true(least[kind] > bound && found[kind] >= 5);
-    moments_free(&twin);
 }
 
 /* Noise finer than codes is rounded alike by everybody: nothing is said of it, nor of images without noise. */

@@ -3,6 +3,7 @@
 #include "tools/images/pixel_codec.h"
 
 #include "layer_reader.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #include <zlib.h>
@@ -40,7 +41,7 @@ static size_t assert_round_trip(const struct moments *m)
     size_t size;
     bool uniform;
     MUST(pixel_codec_encode(m, 0, &bytes, &size, &uniform, &e));
-    struct layer_numbers l = layer_read(bytes, size, m->width, m->height);
+    OWN(layer_numbers) l = layer_read(bytes, size, m->width, m->height);
     size_t pixels = (size_t)m->width * (size_t)m->height;
     assert_int_equal(uniform, l.n == NULL);
     for (size_t i = 0; i < pixels; i++) {
@@ -60,7 +61,6 @@ static size_t assert_round_trip(const struct moments *m)
                 assert_float_equal(l.error[3 * i + c] / error, 1, 0.03);
         }
     }
-    layer_numbers_free(&l);
     free(bytes);
     return size;
 }
@@ -82,7 +82,7 @@ static double normal(uint32_t *state)
  * of 64, 1.5 steps, so 2.7 bits. 1.5 bytes a pixel are allowed. */
 TEST(noisy_grey_is_small)
 {
-    struct moments m = blank(64, 64, "sample");
+    OWN(moments) m = blank(64, 64, "sample");
     uint32_t seed = 5;
     for (size_t i = 0; i < 64 * 64; i++) {
         double v = 0.25 * (1 + 0.01 * normal(&seed)), error = 0.0025 * (1 + 0.09 * normal(&seed));
@@ -92,14 +92,13 @@ TEST(noisy_grey_is_small)
     size_t size = assert_round_trip(&m);
     print_message("%.2f bytes a pixel\n", (double)size / 4096);
     assert_true(size < 4096 * 3 / 2);
-    moments_free(&m);
 }
 
 TEST(hard_images_are_exact)
 {
     uint32_t seed = 7;
     for (int kind = 0; kind < 6; kind++) {
-        struct moments m = blank(33, 17, kind == 1 ? "exact" : "sample");
+        OWN(moments) m = blank(33, 17, kind == 1 ? "exact" : "sample");
         for (size_t i = 0; i < 33 * 17; i++) {
             if (kind == 5)
                 m.n[i] = floor(4 + 1e6 * noise(&seed));
@@ -120,7 +119,6 @@ TEST(hard_images_are_exact)
             }
         }
         assert_round_trip(&m);
-        moments_free(&m);
     }
 }
 
@@ -129,25 +127,23 @@ TEST(small_images)
     static const int size[][2] = {{1, 1}, {1, 5}, {5, 1}, {2, 2}};
     uint32_t seed = 9;
     for (size_t k = 0; k < 4; k++) {
-        struct moments m = blank(size[k][0], size[k][1], "replicate");
+        OWN(moments) m = blank(size[k][0], size[k][1], "replicate");
         for (size_t i = 0; i < (size_t)(m.width * m.height); i++)
             for (size_t c = 0; c < 3; c++)
                 set(&m, i, c, noise(&seed), 0.1);
         assert_round_trip(&m);
-        moments_free(&m);
     }
 }
 
 /* Variance that is not known (one observation) is none. */
 TEST(one_observation)
 {
-    struct moments m = blank(4, 4, "sample");
+    OWN(moments) m = blank(4, 4, "sample");
     for (size_t i = 0; i < 16; i++) {
         m.n[i] = 1;
         m.mean[3 * i] = 0.5;
     }
     assert_round_trip(&m);
-    moments_free(&m);
 }
 
 /* Each root within half a step of 1/128, what is none of them at the end of the range, NaN at 0. */

@@ -7,17 +7,17 @@
 #include "renderer/base/fs.h"
 #include "tools/images/tone_curve.h"
 #include "tools/input/input.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 static void write_floats(const char *path, int width, int height, int channels,
                          const char *const *names, const float *v)
 {
-    struct image im;
+    OWN(image) im;
     struct err e;
     MUST(image_alloc(&im, width, height, channels, names, &e));
     memcpy(im.data, v, (size_t)(width * height * channels) * sizeof *v);
     MUST(image_write_exr(path, &im, &e));
-    image_free(&im);
 }
 
 static const char *const rgb_names[3] = {"R", "G", "B"};
@@ -148,10 +148,10 @@ TEST(test_mitsuba_integrator)
 /* Exponential samples, mean `scale` against 1, in the first `pixels` of 32 x 32; in the others none varies. M3 is forgotten. */
 static enum verdict compare_without_skewness(int n, double scale, int pixels, uint64_t *state)
 {
-    struct input a = {.kind = INPUT_VARIANCE, .is_xyz = true, .m = new_moments(32, 32, "sample")};
-    struct input b = {.kind = INPUT_VARIANCE, .is_xyz = true, .m = new_moments(32, 32, "sample")};
+    OWN(input) a = {.kind = INPUT_VARIANCE, .is_xyz = true, .m = new_moments(32, 32, "sample")};
+    OWN(input) b = {.kind = INPUT_VARIANCE, .is_xyz = true, .m = new_moments(32, 32, "sample")};
     struct notes notes = {0};
-    struct comparison c;
+    OWN(comparison) c;
     struct compare_options opt = {.alpha = 0.05, .tile = 32};
     struct err e;
     simulate(&a.m, LAW_EXPONENTIAL, scale, n, true, state);
@@ -164,11 +164,7 @@ static enum verdict compare_without_skewness(int n, double scale, int pixels, ui
     }
     if (!input_pair(&a, &b, &notes, &e) || !compare_moments(&a.m, &b.m, &opt, &c, &e))
         fail_msg("%s", e.msg);
-    enum verdict v = c.verdict;
-    comparison_free(&c);
-    input_free(&a);
-    input_free(&b);
-    return v;
+    return c.verdict;
 }
 
 /* Of 15 pixels that vary nothing is told: |g| = 1/sqrt 15, far beyond 0.2 x 3/x^3 = 0.02, x about 3.3 at 5 % over four

@@ -2,6 +2,7 @@
 #include "renderer/transport/film.h"
 #include "renderer/math/sampler.h"
 #include "tools/jobs/merge.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 enum { WIDTH = 4, HEIGHT = 2, MAX_SHARES = 4 };
@@ -66,8 +67,8 @@ static void set_layers(float *px, const struct moments *m, size_t pixel, int row
 static void write_part(const char *path, const struct part *p)
 {
     struct err e = {0};
-    struct moments m;
-    struct image layers;
+    OWN(moments) m;
+    OWN(image) layers;
     char cell[64], samples[64];
     assert_true(moments_alloc(&m, p->w, p->h, &e));
     assert_true(image_alloc(&layers, p->w, p->h, NUM_LAYERS, layer_names, &e));
@@ -88,8 +89,6 @@ static void write_part(const char *path, const struct part *p)
                                        {"assay:cell", cell},
                                        {"assay:samples", p->samples ? p->samples : samples}};
     MUST(moments_write_layers(path, &m, p->layers ? &layers : NULL, attrs, 7, &e));
-    moments_free(&m);
-    image_free(&layers);
 }
 
 /* Writes the parts, reads and merges them in the order given. */
@@ -119,7 +118,7 @@ static void check_close(double got, double expected, double tolerance, const cha
  * that. Tolerance 2e-6. */
 static void check_whole(const struct share *whole, uint32_t first, uint32_t last, bool layers)
 {
-    struct moments m;
+    OWN(moments) m;
     struct err e;
     float expected[NUM_LAYERS];
     assert_true(moments_alloc(&m, WIDTH, HEIGHT, &e));
@@ -144,7 +143,6 @@ static void check_whole(const struct share *whole, uint32_t first, uint32_t last
                             layer_names[i]);
         }
     assert_true(layers == (image_channel(&whole->im, layer_names[0]) == 0));
-    moments_free(&m);
 }
 
 TEST(parts_make_the_whole)
@@ -167,7 +165,7 @@ TEST(parts_make_the_whole)
         {{{.layers = true, ALL, 0, 9}, {.layers = true, ALL, 9, 9}}, 0, 9, true},
     };
     for (size_t i = 0; i < COUNT(cases); i++) {
-        struct share whole = {0}, again = {0};
+        OWN(share) whole = {0}, again = {0};
         struct err e = {0};
         const char *path = test_path("whole.exr");
         if (!merge(cases[i].part, num_parts(cases[i].part), &whole, &e))
@@ -178,8 +176,6 @@ TEST(parts_make_the_whole)
         if (!share_read(path, &again, &e))
             fail_msg("case %zu: %s", i, e.msg);
         assert_true(again.num_ranges == 1 && again.range[0][1] == cases[i].last);
-        share_free(&whole);
-        share_free(&again);
     }
 }
 
@@ -228,7 +224,7 @@ TEST(any_grouping_has_the_same_bits)
     static const char *const by_cell[][4] = {{"3210"}, {"02", "31", "45"}, {"13", "240"}};
     for (size_t c = 0; c < COUNT(cases); c++) {
         size_t num = c == 0 ? 4 : 3;
-        struct image first = {0};
+        OWN(image) first = {0};
         for (int k = 0; k < MAX_SHARES; k++)
             write_part(part_path(k), &cases[c][k]);
         for (size_t g = 0; g < num; g++) {
@@ -246,7 +242,6 @@ TEST(any_grouping_has_the_same_bits)
             if (g > 0)
                 image_free(&im);
         }
-        image_free(&first);
     }
 }
 
@@ -262,13 +257,12 @@ TEST(rounded_sums_have_other_bits)
     for (int g = 0; g < 2; g++) {
         if (g == 1) {
             merge_files("01", 3);
-            struct image im;
+            OWN(image) im;
             read_floats(part_path(3), &im);
             for (int i = 0; i < im.num_attrs; i++)
                 if (strcmp(im.attr[2 * i], "assay:parts") == 0)
                     im.attr[2 * i][0] = 'x';
             MUST(image_write_exr(part_path(3), &im, &e));
-            image_free(&im);
         }
         for (int i = 0; i < 3 - g; i++)
             MUST(share_read(part_path(g == 0 ? i : 3 - i), &share[i], &e));

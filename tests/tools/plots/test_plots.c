@@ -4,6 +4,7 @@
 #include "tools/html/html.h"
 #include "tools/plots/plot.h"
 #include "tools/plots/plot_power.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 /* The i-th smallest of n uniform numbers is at most x if at least i of them are: a binomial tail. */
@@ -102,7 +103,7 @@ static char *saved(const char *link)
 
 TEST(csv_comes_back)
 {
-    char *link = NULL;
+    OWN_TEXT link = NULL;
     size_t size;
     FILE *f = open_memstream(&link, &size);
     assert_non_null(f);
@@ -117,16 +118,14 @@ TEST(csv_comes_back)
     csv_link_line(&csv);
     csv_link_close(&csv);
     fclose(f);
-    char *text = saved(link);
+    OWN_TEXT text = saved(link);
     assert_string_equal(
         text, "name,a,b\r\n\"say \"\"hi\"\", <b>&#'\xc3\xa4\",-0.25,\r\n\"'=1+1\",1e-09,3\r\n");
-    free(text);
-    free(link);
 }
 
 TEST(text_is_escaped_and_numbers_are_printed)
 {
-    char *text = NULL;
+    OWN_TEXT text = NULL;
     size_t size;
     FILE *f = open_memstream(&text, &size);
     assert_non_null(f);
@@ -135,13 +134,12 @@ TEST(text_is_escaped_and_numbers_are_printed)
     fclose(f);
     assert_string_equal(text,
                         "<b title=\"&quot;x&#39;\">&lt;i&gt;&amp;</b> -3 7 +1.50% 1099511627776");
-    free(text);
 }
 
 /* Of a drawing: the places of marks, and the numbers of the axes, by hand. */
 TEST(axes_are_in_proportion)
 {
-    char *text = NULL;
+    OWN_TEXT text = NULL;
     size_t size;
     FILE *f = open_memstream(&text, &size);
     assert_non_null(f);
@@ -176,5 +174,4 @@ TEST(axes_are_in_proportion)
     static const double steps[][2] = {{5, 1}, {5.1, 2}, {12, 5}, {0.3, 0.1}, {40, 10}};
     for (size_t i = 0; i < sizeof steps / sizeof *steps; i++)
         assert_float_equal(plot_step(steps[i][0]), steps[i][1], 1e-9);
-    free(text);
 }

@@ -10,6 +10,7 @@
 #include "tools/plots/plot_interval.h"
 #include "tools/results/results.h"
 #include "tests/tools/images/layer_reader.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #include <sys/stat.h>
@@ -45,7 +46,7 @@ static void run_free(struct run *r)
 static void run_write_results(const struct run *r)
 {
     struct err e = {""};
-    json_t *root =
+    json_auto_t *root =
         json_pack("{si ss ss ss sf ss ss sf sO}", "assay", 1, "command", "assay validate suite",
                   "version", "0.1 (abc)", "date", "2026-01-02T03:04:05Z", "alpha", 1e-3, "machine",
                   "2 x CPU", "mode", "golden", "seconds", 98.0, "claims", r->claims);
@@ -55,7 +56,6 @@ static void run_write_results(const struct run *r)
         json_object_set_new(root, "page_every_s", json_real(2.5));
     }
     MUST(json_write(r->results, root, &e));
-    json_decref(root);
 }
 
 /* Uniform on (0, 1), for images that PNG cannot compress. */
@@ -72,7 +72,7 @@ static void write_radiance(const struct run *r, const char *file, const char *un
                            double noise_level, uint32_t seed)
 {
     struct err e = {""};
-    struct moments m;
+    OWN(moments) m;
     char path[256];
     snprintf(path, sizeof path, "%s/%s", r->dir, file);
     assert_true(moments_alloc(&m, side, side, &e));
@@ -89,7 +89,6 @@ static void write_radiance(const struct run *r, const char *file, const char *un
     memcpy(&m.mean[3 * (size_t)(SPECIAL_Y * side + SPECIAL_X)], special, sizeof special);
     if (!fs_make_parent_dirs(path, &e) || !moments_write(path, &m, NULL, 0, &e))
         fail_msg("%s", e.msg);
-    moments_free(&m);
 }
 
 static void add_claim(struct run *r, const char *scene, const char *b, const char *expected,
@@ -186,10 +185,9 @@ static char *text_of(htmlDocPtr doc, const char *xpath, int index)
 
 static void assert_text_has(htmlDocPtr doc, const char *xpath, int index, const char *wanted)
 {
-    char *text = text_of(doc, xpath, index);
+    OWN_TEXT text = text_of(doc, xpath, index);
     if (strstr(text, wanted) == NULL)
         fail_msg("%s [%d] is '%s', without '%s'", xpath, index, text, wanted);
-    free(text);
 }
 
 static uint8_t *decode_base64(const char *text, size_t *size)
@@ -408,7 +406,7 @@ TEST(page_files_are_safe_to_embed)
 
 TEST(page_is_whole)
 {
-    struct run r = run_of_small_files();
+    OWN(run) r = run_of_small_files();
     add_claim(&r, "41_cornell", "cycles", "EQUIVALENT", "EQUIVALENT", small_files);
     add_claim(&r, "91_wrong", "cycles", "EQUIVALENT", "DIFFERENT", small_files);
     add_error(&r, "12_furnace", "povray", "povray: not installed");
@@ -472,12 +470,10 @@ TEST(page_is_whole)
             doc, "//*[@href][not(starts-with(@href, '#') or starts-with(@href, 'data:text/csv'))]"),
         0);
     assert_int_equal(count_nodes(doc, "//link | //iframe | //object | //embed"), 0);
-    char *text = test_read(r.page);
+    OWN_TEXT text = test_read(r.page);
     assert_null(strstr(text, "http://"));
     assert_null(strstr(text, "https://"));
-    free(text);
     xmlFreeDoc(doc);
-    run_free(&r);
 }
 
 /* The layer with that number, as its reader sees it. The caller frees. */
@@ -485,12 +481,11 @@ static struct layer_numbers page_layer(htmlDocPtr doc, int index, int side)
 {
     char xpath[64];
     snprintf(xpath, sizeof xpath, "//script[@id='layer-%d']", index);
-    char *text = text_of(doc, xpath, 0);
+    OWN_TEXT text = text_of(doc, xpath, 0);
     size_t size;
     uint8_t *bytes = decode_base64(text, &size);
     struct layer_numbers l = layer_read(bytes, size, side, side);
     free(bytes);
-    free(text);
     return l;
 }
 
@@ -498,7 +493,7 @@ static struct layer_numbers page_layer(htmlDocPtr doc, int index, int side)
  * standard error is sqrt(1/(64 x 63)) = 0.01575. */
 TEST(images_have_the_values)
 {
-    struct run r = run_of_small_files();
+    OWN(run) r = run_of_small_files();
     add_claim(&r, "41_cornell", "cycles", "EQUIVALENT", "EQUIVALENT", small_files);
     htmlDocPtr doc = run_report(&r);
     assert_text_has(doc, "//h1", 0, "The claim came out as expected.");
@@ -507,7 +502,7 @@ TEST(images_have_the_values)
     assert_text_has(doc, "//section[@class='scene']/p[@class='caption']", 0, "radiance 0.312 and");
     static const double special[3] = {0.1, 0.05, 0.2};
     for (int i = 0; i < 2; i++) {
-        struct layer_numbers l = page_layer(doc, i, 32);
+        OWN(layer_numbers) l = page_layer(doc, i, 32);
         assert_null(l.n);
         for (size_t c = 0; c < 3; c++) {
             double error = sqrt(1.0 / (64 * 63));
@@ -516,14 +511,13 @@ TEST(images_have_the_values)
             assert_float_equal(l.value[at], special[c], error / 16 * 1.03);
             assert_float_equal(l.error[at], error, 0.03 * error);
         }
-        layer_numbers_free(&l);
     }
     assert_text_has(doc, "//script[@id='layer-0']/@data-n", 0, "64");
     assert_text_has(doc, "//script[@id='layer-0']/@data-unit", 0, "sample");
     assert_text_has(doc, "//script[@id='layer-1']/@data-unit", 0, "replicate");
 
     /* The colours of maps: 257 of the diverging one, 256 of the sequential one. */
-    char *text = text_of(doc, "//script[@id='colours']", 0);
+    OWN_TEXT text = text_of(doc, "//script[@id='colours']", 0);
     size_t size;
     uint8_t *bytes = decode_base64(text, &size), c[3];
     assert_int_equal(size, 3 * (257 + 256));
@@ -532,15 +526,13 @@ TEST(images_have_the_values)
     plot_sequential_rgb8(1, c);
     assert_memory_equal(bytes + size - 3, c, 3);
     free(bytes);
-    free(text);
     xmlFreeDoc(doc);
-    run_free(&r);
 }
 
 /* Evidence is folded where there is much of it and it is as expected. */
 TEST(much_evidence_is_folded)
 {
-    struct run r = run_of_small_files();
+    OWN(run) r = run_of_small_files();
     for (int i = 0; i < 8; i++)
         add_claim(&r, "41_cornell", "cycles", "EQUIVALENT", "EQUIVALENT", small_files);
     htmlDocPtr doc = run_report(&r);
@@ -561,16 +553,15 @@ TEST(much_evidence_is_folded)
     assert_text_has(doc, "//header/p[@class='error-line']", 0, "31 more are to be judged");
     assert_text_has(doc, "//h1", 0, "So far 1 of 9 claims did not come out as expected.");
     xmlFreeDoc(doc);
-    run_free(&r);
 }
 
 /* The policy in the page lets exactly the embedded script run. */
 TEST(policy_admits_the_script)
 {
-    struct run r = run_of_small_files();
+    OWN(run) r = run_of_small_files();
     add_claim(&r, "41_cornell", "cycles", "EQUIVALENT", "EQUIVALENT", small_files);
     xmlFreeDoc(run_report(&r));
-    char *text = test_read(r.page);
+    OWN_TEXT text = test_read(r.page);
     char *begin = strstr(text, "<script>");
     assert_non_null(begin);
     begin += strlen("<script>");
@@ -587,15 +578,13 @@ TEST(policy_admits_the_script)
     strcpy(wanted + n + BASE64_ENCODE_RAW_LENGTH(sizeof digest), "'");
     assert_non_null(strstr(text, wanted));
     assert_non_null(strstr(text, "default-src 'none'"));
-    free(text);
-    run_free(&r);
 }
 
 TEST(names_cannot_inject_markup)
 {
     static const char evil[] = "</title></script><script>alert(1)</script>";
     static const char quote[] = "\"'><img src=x onerror=alert(2)>";
-    struct run r = run_of_small_files();
+    OWN(run) r = run_of_small_files();
     add_claim(&r, evil, quote, "EQUIVALENT", "EQUIVALENT", small_files);
     json_t *claim = json_array_get(r.claims, 0);
     static const char *const member[] = {"title", "detects",   "blind_to", "reason", "a",
@@ -613,13 +602,12 @@ TEST(names_cannot_inject_markup)
     assert_text_has(doc, "//table[@id='claims']/tbody/tr/th", 1, evil);
     assert_text_has(doc, "//article[@id='claim-1']/p", 0, evil);
     xmlFreeDoc(doc);
-    run_free(&r);
 }
 
 /* Ten claims on five scenes of 256 x 256 pixels of pure noise, 13 standard errors high. */
 TEST(page_stays_small)
 {
-    struct run r = run_make();
+    OWN(run) r = run_make();
     for (int scene = 0; scene < 5; scene++)
         for (int k = 0; k < 2; k++) {
             char name[32], file[4][64];
@@ -652,7 +640,6 @@ TEST(page_stays_small)
     snprintf(said, sizeof said, "the numbers of %d of its 15 images", 15 - layers);
     assert_text_has(doc, "//main", 0, said);
     xmlFreeDoc(doc);
-    run_free(&r);
 }
 
 static void expect_failure(const struct run *r, const char *wanted)
@@ -666,7 +653,7 @@ TEST(bad_input_is_named)
 {
     struct err e = {""};
     for (size_t i = 0; i < 2; i++) {
-        struct run r = run_of_small_files();
+        OWN(run) r = run_of_small_files();
         add_claim(&r, "41_cornell", "cycles", "EQUIVALENT", "EQUIVALENT", small_files);
         /* An older page must survive a failure. */
         assert_true(fs_make_parent_dirs(r.page, &e));
@@ -675,13 +662,11 @@ TEST(bad_input_is_named)
         snprintf(path, sizeof path, "%s/%s", r.dir, small_files[i]);
         assert_int_equal(remove(path), 0);
         expect_failure(&r, path);
-        char *text = test_read(r.page);
+        OWN_TEXT text = test_read(r.page);
         assert_string_equal(text, "old");
-        free(text);
-        run_free(&r);
     }
 
-    struct run r = run_of_small_files();
+    OWN(run) r = run_of_small_files();
     add_claim(&r, "41_cornell", "cycles", "EQUIVALENT", "EQUIVALENT", small_files);
     write_radiance(&r, small_files[1], "exact", 16, 0, 1);
     expect_failure(&r, "data/s/b.exr: 16 x 16 pixels, but data/s/a.exr has 32 x 32");
@@ -689,7 +674,6 @@ TEST(bad_input_is_named)
 
     assert_int_equal(remove(r.results), 0);
     REFUSES(report_write(r.results, r.page, &e), r.results);
-    run_free(&r);
 }
 
 static double redistributed(double hyab)
@@ -711,7 +695,7 @@ TEST(alike)
     enum { SIDE = 12, PIXELS = SIDE * SIDE };
     const double grey = 0.18418651851, white = 3;
     struct err e = {""};
-    struct moments a, b;
+    OWN(moments) a, b;
     struct similarity l;
     float map[PIXELS];
     assert_true(moments_alloc(&a, SIDE, SIDE, &e) && moments_alloc(&b, SIDE, SIDE, &e));
@@ -737,14 +721,12 @@ TEST(alike)
     memset(b.mean, 0, 3 * PIXELS * sizeof *b.mean);
     assert_true(report_similarity_measure(&a, &b, white, &l, map, &e));
     assert_false(l.has_flip);
-    moments_free(&a);
-    moments_free(&b);
 }
 
 /* Identical images, and a table that names who disagrees. */
 TEST(alike_on_the_page)
 {
-    struct run r = run_of_small_files();
+    OWN(run) r = run_of_small_files();
     add_claim(&r, "same", "truth", "EQUIVALENT", "EQUIVALENT", small_files);
     add_claim(&r, "wrong", "truth", "DIFFERENT", "DIFFERENT", small_files);
     htmlDocPtr doc = run_report(&r);
@@ -756,7 +738,6 @@ TEST(alike_on_the_page)
     assert_int_equal(count_nodes(doc, "//script[starts-with(@id, 'flip-')]"), 2);
     assert_int_equal(count_nodes(doc, "//a[@download='alike.csv']"), 1);
     xmlFreeDoc(doc);
-    run_free(&r);
 }
 
 static int clean_parser(void **state)

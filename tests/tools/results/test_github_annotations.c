@@ -1,6 +1,7 @@
 /* Annotations for GitHub: what is printed for each outcome, by GitHub's rules of escaping (in a message %,
  * CR and LF are %25, %0D, %0A; in a property : and , are %3A, %2C too). */
 #include "tools/results/github_annotations.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 static json_t *judged(const char *scene, const char *expected, const char *verdict)
@@ -27,31 +28,27 @@ static char *printed(json_t *claims)
     size_t size;
     FILE *f = open_memstream(&text, &size);
     assert_non_null(f);
-    json_t *results = json_pack("{so}", "claims", claims);
+    json_auto_t *results = json_pack("{so}", "claims", claims);
     github_annotations_print(f, results);
     fclose(f);
-    json_decref(results);
     return text;
 }
 
 TEST(each_outcome)
 {
-    char *text = printed(json_pack(
+    OWN_TEXT text = printed(json_pack(
         "[oooooo]", judged("good", "EQUIVALENT", "EQUIVALENT"),
         judged("found", "DIFFERENT", "DIFFERENT"), judged("bad", "EQUIVALENT", "DIFFERENT"),
         judged("open", "EQUIVALENT", "INCONCLUSIVE"), not_judged("lost", "cycles: not installed"),
         not_judged("lost too", "cycles: not installed")));
-    char *wanted = test_read("tests/tools/results/annotations.expected");
+    OWN_TEXT wanted = test_read("tests/tools/results/annotations.expected");
     assert_string_equal(text, wanted);
-    free(wanted);
-    free(text);
 }
 
 TEST(all_is_well)
 {
-    char *text = printed(json_pack("[o]", judged("good", "EQUIVALENT", "EQUIVALENT")));
+    OWN_TEXT text = printed(json_pack("[o]", judged("good", "EQUIVALENT", "EQUIVALENT")));
     assert_string_equal(text, "::notice title=assay::All 1 claims came out as expected.\n");
-    free(text);
 }
 
 TEST(text_cannot_be_a_command)

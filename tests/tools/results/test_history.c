@@ -4,6 +4,7 @@
 
 #include "reference/base/json_file.h"
 #include "renderer/base/fs.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 static const char *in_dir(const char *dir, const char *name)
@@ -29,11 +30,10 @@ static json_t *claim_of(const char *scene, double difference)
 static void write_run(const char *dir, const char *name, const char *date, json_t *claims)
 {
     struct err e;
-    json_t *root = json_pack("{si ss ss ss sf ss so}", "assay", 1, "command", "assay validate",
-                             "version", "0.1 (commit abc123)", "date", date, "alpha", 1e-3,
-                             "machine", "<b>2 x CPU</b>", "claims", claims);
+    json_auto_t *root = json_pack("{si ss ss ss sf ss so}", "assay", 1, "command", "assay validate",
+                                  "version", "0.1 (commit abc123)", "date", date, "alpha", 1e-3,
+                                  "machine", "<b>2 x CPU</b>", "claims", claims);
     MUST(json_write(in_dir(dir, name), root, &e));
-    json_decref(root);
 }
 
 static void read_or_fail(const char *dir, struct history *h)
@@ -58,7 +58,7 @@ TEST(a_move_is_found)
             json_pack("[oo]", claim_of("10_still", still[i]), claim_of("20_<i>moves", moving[i])));
     }
     test_write(in_dir("three", "b/other.json"), "not a run", 9);
-    struct history h;
+    OWN(history) h;
     read_or_fail("three", &h);
     assert_int_equal(h.num_runs, 3);
     assert_string_equal(h.run[0].path, "a/deep/results.json");
@@ -78,14 +78,12 @@ TEST(a_move_is_found)
 
     struct err e;
     MUST(report_history(&h, test_path("history.html"), &e));
-    char *text = test_read(test_path("history.html"));
+    OWN_TEXT text = test_read(test_path("history.html"));
     assert_non_null(strstr(text, "1 of 2 claims have moved in the last of 3 runs."));
     assert_null(strstr(text, "<i>moves"));
     assert_null(strstr(text, "<b>2 x CPU"));
     assert_null(strstr(text, "<script"));
     assert_non_null(strstr(text, "20_&lt;i&gt;moves"));
-    free(text);
-    history_free(&h);
 }
 
 /* What the last run does not have, and one run alone, moved nowhere. */
@@ -95,12 +93,11 @@ TEST(no_move_without_two_points)
               json_pack("[o]", claim_of("10_gone", 0.5)));
     write_run("two", "2/results.json", "2026-01-02T00:00:00Z",
               json_pack("[o]", claim_of("20_new", -0.5)));
-    struct history h;
+    OWN(history) h;
     read_or_fail("two", &h);
     assert_int_equal(h.num_series, 2);
     assert_int_equal(h.moved, 0);
     assert_float_equal(h.series[0].z, 0, 0);
-    history_free(&h);
 }
 
 TEST(bad_input_is_named)

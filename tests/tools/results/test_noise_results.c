@@ -80,8 +80,7 @@ TEST(what_is_broken_is_refused)
     };
     for (size_t i = 0; i < COUNT(broken); i++) {
         struct err e;
-        json_t *noise = load(broken[i].from, broken[i].to);
+        json_auto_t *noise = load(broken[i].from, broken[i].to);
         REFUSES(noise_results_check(noise, "x.json", &e), broken[i].line);
-        json_decref(noise);
     }
 }

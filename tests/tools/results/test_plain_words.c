@@ -54,10 +54,9 @@ static char *printed(json_t *claims)
     char *text = NULL;
     size_t size;
     FILE *f = open_memstream(&text, &size);
-    json_t *results = json_pack("{so}", "claims", claims);
+    json_auto_t *results = json_pack("{so}", "claims", claims);
     plain_words_print(f, results, "page.html");
     fclose(f);
-    json_decref(results);
     return text;
 }
 

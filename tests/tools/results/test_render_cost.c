@@ -15,7 +15,7 @@ static json_t *results(void)
 
 TEST(test_gather)
 {
-    json_t *root = results();
+    json_auto_t *root = results();
     struct scene_cost c[MAX_COSTS];
     assert_int_equal(render_cost_gather(root, c), 2);
     assert_string_equal(c[0].scene, "<b>");
@@ -25,7 +25,6 @@ TEST(test_gather)
     assert_true(c[1].ours_s == 5.5 && c[1].references_s == 5);
     assert_true(c[1].claims == 3 && c[1].looks == 6 && c[1].undecided == 1);
     assert_true(c[1].largest_n == 256);
-    json_decref(root);
 }
 
 static char *printed(void (*print)(FILE *, const json_t *), const json_t *root)
@@ -41,7 +40,7 @@ static char *printed(void (*print)(FILE *, const json_t *), const json_t *root)
 
 TEST(test_print)
 {
-    json_t *root = results();
+    json_auto_t *root = results();
     char *line = printed(render_cost_print, root);
     assert_string_equal(line, "cost: <b> 20 s of 30.5 s (1 undecided), a 10 s (1 undecided) of "
                               "processor time\n");
@@ -59,5 +58,4 @@ TEST(test_print)
     assert_string_equal(table, "");
     free(line);
     free(table);
-    json_decref(root);
 }

@@ -3,6 +3,7 @@
 #include "tools/results/results_table.h"
 
 #include "tools/results/claim_result.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #include <libxml/parser.h>
@@ -61,10 +62,9 @@ static void expect_rejected(const char *text, const char *wanted)
 
 static void expect_root_rejected(json_t *root, const char *wanted)
 {
-    char *text = json_dumps(root, 0);
+    OWN_TEXT text = json_dumps(root, 0);
     assert_non_null(text);
     expect_rejected(text, wanted);
-    free(text);
     json_decref(root);
 }
 
@@ -81,9 +81,8 @@ TEST(round_trip)
     MUST(json_write(path, root, &e));
     MUST(results_read(path, &back, &e));
     assert_true(json_equal(root, back));
-    char *text = test_read(path);
+    OWN_TEXT text = test_read(path);
     assert_string_equal(text + strlen(text) - 2, "}\n");
-    free(text);
     json_decref(back);
     json_decref(root);
 }
@@ -220,7 +219,7 @@ TEST(bad_file)
     expect_rejected("", ":1: ");
     expect_rejected("[]", "not an object");
 
-    json_t *root = results_of(1, (json_t *[]){judged_claim()});
+    json_auto_t *root = results_of(1, (json_t *[]){judged_claim()});
     set(root, "assay", "2");
     expect_root_rejected(root, "'assay' is not 1");
     root = results_of(1, (json_t *[]){judged_claim()});
@@ -240,7 +239,6 @@ TEST(bad_file)
 
     root = json_object();
     REFUSES(json_write("/proc/no/results.json", root, &e), "/proc/no");
-    json_decref(root);
 }
 
 /* NO DIFFERENCE FOUND has passed where no more could have been missed, of the image and of a tile, than was
@@ -310,10 +308,9 @@ TEST(exit_codes)
             claim[num] = row[i].verdict[num] == NULL
                              ? parse(error_claim)
                              : claim_with(row[i].verdict[num], row[i].expected[num]);
-        json_t *root = results_of(num, claim);
+        json_auto_t *root = results_of(num, claim);
         if (results_exit_code(root) != row[i].code)
             fail_msg("row %zu: %d, not %d", i, results_exit_code(root), row[i].code);
-        json_decref(root);
     }
     /* Without time it is inconclusive: worse than a pass, better than a difference. */
     json_t *late = parse(error_claim);
@@ -361,7 +358,7 @@ TEST(tables)
 {
     static const char *const expected[] = {"tests/tools/results/table.expected",
                                            "tests/tools/results/table_markdown.expected"};
-    json_t *root = table_results();
+    json_auto_t *root = table_results();
     for (int markdown = 0; markdown < 2; markdown++) {
         char *text = NULL, *wanted = test_read(expected[markdown]);
         size_t size;
@@ -373,7 +370,6 @@ TEST(tables)
         free(text);
         free(wanted);
     }
-    json_decref(root);
 }
 
 static size_t count_children(const xmlNode *parent, const char *name)
@@ -411,8 +407,9 @@ TEST(junit_reads_back)
     json_t *error = parse(error_claim);
     /* An escape and U+FFFF, which no XML 1.0 file may hold. */
     json_object_set_new(error, "error", json_string("\x1b[31m died: \"x<y\" \xef\xbf\xbf."));
-    json_t *root = results_of(4, (json_t *[]){claim_with("EQUIVALENT", "EQUIVALENT"), wrong,
-                                              claim_with("INCONCLUSIVE", "EQUIVALENT"), error});
+    json_auto_t *root =
+        results_of(4, (json_t *[]){claim_with("EQUIVALENT", "EQUIVALENT"), wrong,
+                                   claim_with("INCONCLUSIVE", "EQUIVALENT"), error});
     const char *path = test_path("deep/er/junit.xml");
     struct err e;
     MUST(junit_write(path, root, &e));
@@ -465,7 +462,6 @@ TEST(junit_reads_back)
     assert_int_equal(count_children(test, "failure"), 0);
     assert_attribute(child(test, "error", 0), "message", "?[31m died: \"x<y\" ???.");
     xmlFreeDoc(doc);
-    json_decref(root);
 }
 
 /* A file name in Latin-1, say. */
@@ -481,9 +477,8 @@ TEST(an_argument_that_is_no_utf8_is_named)
                                "che.exr' is no UTF-8, and results hold nothing else");
     argv[1] = "k\xc3\xbc"
               "che.exr";
-    json_t *root = claim_result_new_results(3, argv, 0.01, &e);
+    json_auto_t *root = claim_result_new_results(3, argv, 0.01, &e);
     assert_non_null(root);
-    json_decref(root);
 }
 
 static int clean_parser(void **state)

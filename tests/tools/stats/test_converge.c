@@ -5,6 +5,7 @@
 #include "tools/results/convergence_results.h"
 #include "tools/results/results_matrix.h"
 #include "tools/report/report.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #include <libxml/HTMLparser.h>
@@ -68,7 +69,7 @@ static void render(gsl_rng *rng, const struct engine *g, double n, int count, fl
 static struct converge_reference make_reference(gsl_rng *rng, const struct engine *g, double spp,
                                                 int n)
 {
-    struct moments m;
+    OWN(moments) m;
     struct err e;
     struct converge_reference r;
     assert_true(moments_alloc(&m, WIDTH, HEIGHT, &e));
@@ -86,7 +87,6 @@ static struct converge_reference make_reference(gsl_rng *rng, const struct engin
     }
     MUST(convergence_rate_reference_init(&r, &m, 1, &e));
     free(image);
-    moments_free(&m);
     return r;
 }
 
@@ -239,7 +239,7 @@ TEST(cost_is_a_line_without_the_start)
 
 TEST(a_smaller_reference_is_a_box_average)
 {
-    struct moments m;
+    OWN(moments) m;
     struct converge_reference r;
     struct err e;
     assert_true(moments_alloc(&m, 4, 2, &e));
@@ -266,7 +266,6 @@ TEST(a_smaller_reference_is_a_box_average)
     strcpy(m.unit, "exact");
     memset(m.mean, 0, 24 * sizeof *m.mean);
     REFUSES(convergence_rate_reference_init(&r, &m, 1, &e), "black");
-    moments_free(&m);
 }
 
 /* H0: the interval of the slope misses -1/2 in alpha of all runs, of an unbiased engine of independent

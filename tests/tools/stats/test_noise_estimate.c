@@ -5,6 +5,7 @@
 #include "tools/compare/compare.h"
 #include "tools/compare/pyramid.h"
 #include "tools/stats/noise_estimate.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #include <gsl/gsl_cdf.h>
@@ -46,12 +47,11 @@ static void paint(struct moments *m, enum noise kind, double scale, uint64_t *st
 /* Sums over the image, red. */
 static struct cell image_cell(const struct moments *a, const struct moments *b)
 {
-    struct pyramid p;
+    OWN(pyramid) p;
     struct err e;
     if (!pyramid_build(a, b, 0, a->width, &p, &e))
         abort();
     struct cell c = p.level[p.num_levels - 1].cell[0];
-    pyramid_free(&p);
     return c;
 }
 
@@ -67,7 +67,7 @@ static void assert_between(double got, double lo, double hi)
  * is 0 +- 6.1/256 = 0.024 (test of four of these). */
 TEST(test_independent)
 {
-    struct moments a = new_moments(256, 256, "sample"), b = new_moments(256, 256, "sample");
+    OWN(moments) a = new_moments(256, 256, "sample"), b = new_moments(256, 256, "sample");
     uint64_t seed = 5;
     struct noise_estimate s;
     struct err e;
@@ -82,8 +82,6 @@ TEST(test_independent)
     assert_between(s.skewness[0], -4 * 0.024, 4 * 0.024);
     assert_between(s.skew_error[0], 0.018, 0.032);
     assert_string_equal(a.unit, "picture");
-    moments_free(&a);
-    moments_free(&b);
 }
 
 /* Shared by k x k, k = 2 and 7: the sum's variance is k^2 times that of independent pixels of the same sd (each own
@@ -95,7 +93,7 @@ TEST(test_shared)
         enum noise kind;
         double factor, lo, hi;
     } cases[] = {{SHARED, 2, 2.5, 5}, {SMOOTHED, 49, 0.95 * 49, 2.5 * 49}};
-    struct moments a = new_moments(256, 256, "sample"), b = new_moments(256, 256, "sample");
+    OWN(moments) a = new_moments(256, 256, "sample"), b = new_moments(256, 256, "sample");
     uint64_t seed = 6;
     struct noise_estimate s;
     struct err e;
@@ -110,14 +108,12 @@ TEST(test_shared)
         assert_true(s.factor[0] > cases[k].factor);
         assert_between((c.va + c.vb) / independent, cases[k].lo, cases[k].hi);
     }
-    moments_free(&a);
-    moments_free(&b);
 }
 
 /* A - B = f(x) + g(y), steps and all: nothing the kernel sees, so no noise. */
 TEST(test_blind_to_sums)
 {
-    struct moments a = new_moments(32, 32, "sample"), b = new_moments(32, 32, "sample");
+    OWN(moments) a = new_moments(32, 32, "sample"), b = new_moments(32, 32, "sample");
     struct noise_estimate s;
     struct err e;
     for (int i = 0; i < 32 * 32; i++)
@@ -128,8 +124,6 @@ TEST(test_blind_to_sums)
     assert_true(noise_estimate_variance(&a, &b, NULL, NULL, NULL, &s, &e));
     for (int i = 0; i < 3 * 32 * 32; i++)
         assert_true(a.m2[i] == 0 && b.m2[i] == 0);
-    moments_free(&a);
-    moments_free(&b);
 }
 
 TEST(test_refused)
@@ -161,12 +155,12 @@ TEST(test_refused)
 static int count_different(enum noise kind, double scale, double alpha, int runs, bool decree,
                            uint64_t seed)
 {
-    struct moments a = new_moments(64, 64, "sample"), b = new_moments(64, 64, "sample");
+    OWN(moments) a = new_moments(64, 64, "sample"), b = new_moments(64, 64, "sample");
     struct compare_options opt = {.alpha = alpha, .tile = 16};
     int different = 0;
     for (int i = 0; i < runs; i++) {
         struct noise_estimate s;
-        struct comparison c;
+        OWN(comparison) c;
         struct err e;
         paint(&a, kind, scale, &seed);
         paint(&b, kind, 1, &seed);
@@ -180,10 +174,7 @@ static int count_different(enum noise kind, double scale, double alpha, int runs
         }
         MUST(compare_moments(&a, &b, &opt, &c, &e));
         different += c.verdict == VERDICT_DIFFERENT;
-        comparison_free(&c);
     }
-    moments_free(&a);
-    moments_free(&b);
     return different;
 }
 

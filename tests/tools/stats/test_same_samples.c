@@ -1,6 +1,7 @@
 /* The same samples added up in other ways, as floats store them; and what a wrong sum would look like. */
 #include "renderer/math/sampler.h"
 #include "tools/stats/same_samples.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 enum { WIDTH = 5, HEIGHT = 3, N = 40, CUT = 13 };
@@ -47,7 +48,7 @@ enum fault {
 
 static int differing(enum fault fault, char reason[128])
 {
-    struct moments whole = share(0, N), first = share(0, CUT), rest = share(CUT, N);
+    OWN(moments) whole = share(0, N), first = share(0, CUT), rest = share(CUT, N);
     struct err e;
     const size_t last = WIDTH * HEIGHT - 1;
     double m2[3 * WIDTH * HEIGHT], late[3 * WIDTH * HEIGHT];
@@ -69,9 +70,6 @@ static int differing(enum fault fault, char reason[128])
     for (size_t p = 0; p <= last; p++)
         first.n[p] -= fault == ONE_COUNT_LESS;
     int found = same_samples_differing(&whole, &first, 0, reason);
-    moments_free(&whole);
-    moments_free(&first);
-    moments_free(&rest);
     return found;
 }
 

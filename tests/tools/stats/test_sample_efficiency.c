@@ -5,8 +5,8 @@
 #include "renderer/math/sampler.h"
 #include "tools/stats/sample_efficiency.h"
 #include "tools/sequential/adaptive_stop.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
-
 
 static double uniform(uint32_t stream, uint32_t i, int k)
 {
@@ -168,7 +168,7 @@ static struct adaptive_stop adapt(enum rule rule)
 {
     enum { BATCH = 16, MOST = 4096 };
     const double tolerance = 0.1;
-    struct moments m;
+    OWN(moments) m;
     struct err e;
     assert_true(moments_alloc(&m, SIDE, SIDE, &e));
     for (uint32_t p = 0; p < PIXELS; p++) {
@@ -184,7 +184,6 @@ static struct adaptive_stop adapt(enum rule rule)
         }
     }
     struct adaptive_stop r = adaptive_stop_check(&m, BATCH, tolerance, MOST);
-    moments_free(&m);
     return r;
 }
 

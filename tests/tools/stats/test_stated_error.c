@@ -161,19 +161,18 @@ TEST(records_are_checked)
         assert_non_null(at);
         snprintf(text, sizeof text, "%.*s%s%s", (int)(at - record), record, cases[i][1],
                  at + strlen(cases[i][0]));
-        json_t *c = json_loads(text, 0, NULL);
+        json_auto_t *c = json_loads(text, 0, NULL);
         assert_non_null(c);
         bool ok = stated_error_check(c, "results", &e);
         if (ok != (cases[i][2] == NULL) || (!ok && strstr(e.msg, cases[i][2]) == NULL))
             fail_msg("case %zu: %s", i, e.msg);
-        json_decref(c);
     }
 }
 
 /* What is printed and what is in the page; markup in names stays text. */
 TEST(records_are_shown)
 {
-    json_t *c = json_loads(record, 0, NULL);
+    json_auto_t *c = json_loads(record, 0, NULL);
     assert_int_equal(stated_error_outcome(json_array_get(c, 0)), OUTCOME_AS_EXPECTED);
     assert_int_equal(stated_error_outcome(json_array_get(c, 1)), OUTCOME_NOT_JUDGED);
     char *text;
@@ -192,5 +191,4 @@ TEST(records_are_shown)
     assert_non_null(strstr(text, "12_&lt;b&gt;"));
     assert_non_null(strstr(text, "no &lt;file&gt;"));
     free(text);
-    json_decref(c);
 }

@@ -1,5 +1,6 @@
 /* tools/stats/third_moment.c: bounds against third moments that are known, and verdicts without them. */
 #include "tests/support/simulate.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 #include "tools/compare/compare.h"
 #include "tools/stats/third_moment.h"
@@ -61,7 +62,7 @@ TEST(test_bound_meets_the_truth)
  * vA = 1/99, vB = 3/99: k3A - k3B = (4/99)^1.5, and k3A^2/vA + k3B^2/vB = V^2. */
 TEST(test_too_few_pixels)
 {
-    struct moments a = new_moments(16, 16, "sample"), b = new_moments(16, 16, "sample");
+    OWN(moments) a = new_moments(16, 16, "sample"), b = new_moments(16, 16, "sample");
     constant(&a, 1, 100);
     constant(&b, 1, 100);
     for (size_t i = 0; i < 45; i++) {
@@ -73,19 +74,17 @@ TEST(test_too_few_pixels)
     assert_near(k3a - k3b, pow(4.0 / 99, 1.5), 1e-12);
     assert_near(k3a * k3a * 99 + k3b * k3b * 33, pow(4.0 / 99, 2), 1e-12);
     assert_true(a.m3[0] == 0 && b.m3[0] == 0);
-    moments_free(&a);
-    moments_free(&b);
 }
 
 /* Verdicts of equal images of a law, 16 x 16, tiles of 8, with M3 bounded or said to be 0. */
 static int count_different(enum law law, int n_a, int n_b, int pairs, bool is_bounded,
                            uint64_t seed)
 {
-    struct moments a = new_moments(16, 16, "sample"), b = new_moments(16, 16, "sample");
+    OWN(moments) a = new_moments(16, 16, "sample"), b = new_moments(16, 16, "sample");
     struct compare_options opt = {.alpha = 0.01, .tile = 8};
     int different = 0;
     for (int i = 0; i < pairs; i++) {
-        struct comparison c;
+        OWN(comparison) c;
         simulate(&a, law, 1, n_a, true, &seed);
         simulate(&b, law, 1, n_b, true, &seed);
         forget(&a);
@@ -94,10 +93,7 @@ static int count_different(enum law law, int n_a, int n_b, int pairs, bool is_bo
             assert_true(third_moment_bound(&a, &b, true, true, &e));
         assert_true(compare_moments(&a, &b, &opt, &c, &e));
         different += c.verdict == VERDICT_DIFFERENT;
-        comparison_free(&c);
     }
-    moments_free(&a);
-    moments_free(&b);
     return different;
 }
 
@@ -117,7 +113,7 @@ TEST(test_level_without_third_moments)
  * image 1.4: no number of samples were enough. */
 TEST(test_dark_pixels)
 {
-    struct moments a = new_moments(32, 32, "sample"), b = new_moments(32, 32, "sample");
+    OWN(moments) a = new_moments(32, 32, "sample"), b = new_moments(32, 32, "sample");
     struct compare_options opt = {
         .alpha = 1e-3, .margin_global = 0.08, .margin_tile = 0.2, .tile = 16};
     struct comparison c;
@@ -136,6 +132,4 @@ TEST(test_dark_pixels)
     assert_true(compare_moments(&a, &b, &opt, &c, &e));
     assert_int_equal(c.verdict, VERDICT_DIFFERENT);
     comparison_free(&c);
-    moments_free(&a);
-    moments_free(&b);
 }

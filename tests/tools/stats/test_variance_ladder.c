@@ -1,6 +1,7 @@
 /* Variances of areas with their intervals: against brute force, then error rates on noise whose law is known, and
  * negative controls that must be found. Seeds and counts were fixed beforehand; nothing is drawn again. */
 #include "tools/stats/variance_ladder.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #include <gsl/gsl_cdf.h>
@@ -36,7 +37,7 @@ static double truth(size_t i)
 
 static struct converge_reference make_unit(void)
 {
-    struct moments m;
+    OWN(moments) m;
     struct converge_reference r;
     struct err e;
     MUST(moments_alloc(&m, WIDTH, HEIGHT, &e));
@@ -46,7 +47,6 @@ static struct converge_reference make_unit(void)
         m.n[i / 3] = 1;
     }
     MUST(convergence_rate_reference_init(&r, &m, 1, &e));
-    moments_free(&m);
     return r;
 }
 
@@ -89,7 +89,7 @@ TEST(estimates_are_their_definitions)
     gsl_rng *rng = new_rng(1);
     struct converge_reference unit = make_unit();
     static struct renders r;
-    struct variance_map between, within;
+    OWN(variance_map) between, within;
     struct err e;
     render_all(rng, EXPONENTIAL, 1, &r);
     MUST(variance_ladder_between(r.images, K, &unit, WIDTH, TILE, &between, &e));
@@ -133,8 +133,6 @@ TEST(estimates_are_their_definitions)
     assert_near(between.tile[5].value, v / pixels, 1e-6);
     assert_near(between.tile[5].se, sqrt(w) / pixels, 1e-6);
     assert_near(within.tile[5].value, inside / pixels, 1e-6);
-    variance_map_free(&between);
-    variance_map_free(&within);
     renders_free(&r);
     convergence_rate_reference_free(&unit);
     gsl_rng_free(rng);
@@ -153,7 +151,7 @@ static void check_rates(enum law law, unsigned long seed)
     struct err e;
     int different = 0, equivalent = 0, missed[2] = {0, 0};
     for (int i = 0; i < RUNS; i++) {
-        struct variance_map run, record, between;
+        OWN(variance_map) run, record, between;
         render_all(rng, law, sqrt(1 + margin), &r);
         render_all(rng, law, 1, &s);
         MUST(variance_ladder_within(r.m, K, &unit, TILE, &run, &e));
@@ -169,9 +167,6 @@ static void check_rates(enum law law, unsigned long seed)
         double is = log(variance_of[law]);
         missed[0] += one.lo > is || one.hi < is;
         missed[1] += two.lo > is - log(SPP) || two.hi < is - log(SPP);
-        variance_map_free(&run);
-        variance_map_free(&record);
-        variance_map_free(&between);
         renders_free(&r);
         renders_free(&s);
     }
@@ -224,10 +219,9 @@ TEST(slopes_of_mostly_black_noise)
                     for (size_t c = 3 * p; c < 3 * p + 3; c++)
                         images[k * SIZE + c] = (float)(truth(c) * (1 + scale * (x - 1)));
                 }
-            struct variance_map map;
+            OWN(variance_map) map;
             MUST(variance_ladder_between(images, K, &unit, WIDTH, TILE, &map, &e));
             rung[i] = (struct rung){.spp = spp[i], .log_mse = variance_ladder_log(map.image)};
-            variance_map_free(&map);
         }
         struct estimate slope = convergence_rate_slope(rung, RUNGS);
         slope.dof = convergence_rate_slope_dof(rung, RUNGS);
@@ -288,7 +282,7 @@ TEST(third_moments_that_cannot_be_are_an_error)
     gsl_rng *rng = new_rng(7);
     struct converge_reference unit = make_unit();
     static struct renders r;
-    struct variance_map map;
+    OWN(variance_map) map;
     struct err e;
     render_all(rng, BLACK, 1, &r);
     for (size_t i = 0; i < SIZE; i++)
@@ -307,7 +301,6 @@ TEST(third_moments_that_cannot_be_are_an_error)
         r.m[k].m3[0] = 0;
     }
     MUST(variance_ladder_within(r.m, K, &unit, TILE, &map, &e));
-    variance_map_free(&map);
     renders_free(&r);
     convergence_rate_reference_free(&unit);
     gsl_rng_free(rng);

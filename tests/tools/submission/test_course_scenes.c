@@ -2,6 +2,7 @@
  * a control: a scene that breaks it, made from a shipped one by replacing some of its text. */
 
 #include "course_scene.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #include <dirent.h>
@@ -108,12 +109,11 @@ TEST(each_broken_rule_is_seen)
         char *text = read_scene(cases[i].scene), *hit = strstr(text, cases[i].from);
         if (hit == NULL)
             fail_msg("%s has no %s", cases[i].scene, cases[i].from);
-        char *other = replaced(text, hit, hit + strlen(cases[i].from), cases[i].to);
+        OWN_TEXT other = replaced(text, hit, hit + strlen(cases[i].from), cases[i].to);
         const char *told = course_scene_breach(other, false);
         if (strstr(told, cases[i].rule) == NULL)
             fail_msg("%s with %s: '%s', not '%s'", cases[i].scene, cases[i].to, told,
                      cases[i].rule);
-        free(other);
         free(text);
     }
 }
@@ -139,11 +139,10 @@ TEST(surfaces_have_one_fan_at_each_point)
         char inner[1000];
         snprintf(inner, sizeof inner, mesh, cases[i].count, cases[i].normal, cases[i].more,
                  cases[i].indices);
-        char *other = replaced(text, from, to, inner);
+        OWN_TEXT other = replaced(text, from, to, inner);
         const char *told = course_scene_breach(other, false), *rule = cases[i].rule;
         if (rule[0] != '\0' ? strstr(told, rule) == NULL : told[0] != '\0')
             fail_msg("%s", told);
-        free(other);
     }
     free(text);
 }
