@@ -682,8 +682,8 @@ TEST(test_margin_of_variance)
             constant(&b, 1, 1);
             strcpy(b.unit, "exact");
         }
-        OWN(comparison)
-        c = compare(&a, &b, (struct compare_options){1e-3, 0.1, 0.4, 16, cases[i].margin});
+        const struct compare_options opt = {1e-3, 0.1, 0.4, 16, cases[i].margin};
+        OWN(comparison) c = compare(&a, &b, opt);
         print_message("%s: %s\n", verdict_name(c.verdict), c.reason);
         assert_int_equal(c.verdict, cases[i].verdict);
         assert_non_null(strstr(c.reason, cases[i].says));

@@ -90,10 +90,8 @@ TEST(test_sizes)
         for (int claim = 0; claim < CLAIMS; claim++) {
             render(&a, k->law, truth, k->n_a, k->grey, &seed);
             render(&b, k->law, truth, k->n_b, k->grey, &seed);
-            OWN(comparison)
-            c = compare(
-                &a, &b,
-                (struct compare_options){.alpha = 0.01, .tile = 4, .margin_variance = 1e-9});
+            const struct compare_options opt = {.alpha = 0.01, .tile = 4, .margin_variance = 1e-9};
+            OWN(comparison) c = compare(&a, &b, opt);
             for (int s = 0; s < NUM_STATISTICS; s++) {
                 tested[s] += c.statistic[s].num_tests > 0;
                 wrong[s] += c.statistic[s].log10_p <= -2;
@@ -189,11 +187,9 @@ TEST(test_dense_margin)
             a.mean[p] += 0.05 * sign[p / 3];
         for (int narrow = 0; narrow < 2; narrow++) {
             double margin = narrow ? 0.01 : 0.05;
-            OWN(comparison)
-            c = compare(
-                &a, &b,
-                (struct compare_options){
-                    .alpha = 0.01, .tile = 4, .margin_global = margin, .margin_tile = margin});
+            const struct compare_options opt = {
+                .alpha = 0.01, .tile = 4, .margin_global = margin, .margin_tile = margin};
+            OWN(comparison) c = compare(&a, &b, opt);
             const struct statistic *s = &c.statistic[STATISTIC_CHI_SQUARE];
             found[narrow] += s->num_tests > 0 && s->log10_p <= -2;
         }
