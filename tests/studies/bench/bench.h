@@ -13,10 +13,12 @@ enum { BENCH_MAX_ROUNDS = 99 };
 struct bench_options {
     enum isa isa;
     int rounds;
+    bool help;
     bool smoke; /* one tiny case of each part, to see that all of it runs; figures mean nothing */
-    const char *build;       /* where pathtracer is */
-    const char *out;         /* directory of results.json and the plots; exists */
-    const char *const *only; /* names of scenes, NULL at the end; none: all */
+    const char *build;                /* where pathtracer is */
+    const char *out;                  /* directory of results.json; exists */
+    const char *only[16], *parts[16]; /* names of scenes and of parts; none: all */
+    int num_only, num_parts;
 };
 
 /* True if the scene was asked for. */

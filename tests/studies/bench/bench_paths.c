@@ -9,7 +9,6 @@
 #include "bench_engines.h"
 #include "bench_scenes.h"
 #include "bench_timing.h"
-#include "drawing.h"
 
 #include "reference/base/process.h"
 #include "renderer/base/fs.h"
@@ -251,36 +250,6 @@ static json_t *show(const struct bench_options *o, const struct bench_view *v,
                      v->camera.height, "depth", v->depth, "engines", engines);
 }
 
-/* Relative error against CPU seconds, engine by engine. */
-static bool plot(const struct bench_options *o, const struct bench_view *v,
-                 const struct runs runs[BENCH_NUM_ENGINES], struct err *e)
-{
-    char path[4096], title[128];
-    snprintf(path, sizeof path, "%s/error_%s.svg", o->out, v->name);
-    snprintf(title, sizeof title, "%s: error of a picture against its CPU time", v->name);
-    struct drawing p = {.title = title,
-                        .x.label = "CPU s",
-                        .y.label = "root of relMSE",
-                        .x.is_log = true,
-                        .y.is_log = true,
-                        .x.lo = 1e-3,
-                        .x.hi = 1e3,
-                        .y.lo = 1e-2,
-                        .y.hi = 1e1};
-    for (int k = 0; k < BENCH_NUM_ENGINES; k++) {
-        if (!runs[k].done)
-            continue;
-        struct drawing_series *s = &p.series[p.num++];
-        snprintf(s->name, sizeof s->name, "%s", bench_engine_names[k]);
-        double seconds = v->camera.width * v->camera.height / (runs[k].mpaths * 1e6);
-        for (int r = 0; r < NUM_RUNGS; r++) {
-            double y = sqrt(runs[k].relmse[r]);
-            drawing_add(s, runs[k].spp[r] * seconds, y, y, y);
-        }
-    }
-    return drawing_write(path, &p, e);
-}
-
 static bool measure(const struct bench_options *o, const struct bench_view *v, json_t *scenes,
                     bool *wrong, struct err *e)
 {
@@ -309,10 +278,8 @@ static bool measure(const struct bench_options *o, const struct bench_view *v, j
     for (int k = 0; ok && k < BENCH_NUM_ENGINES; k++)
         if (runs[k].done)
             ok = judge(o, v, &m, &runs[k], &runs[BENCH_MIS], e);
-    if (ok) {
+    if (ok)
         json_array_append_new(scenes, show(o, v, runs, wrong));
-        ok = plot(o, v, runs, e);
-    }
     for (int k = 0; k < BENCH_NUM_ENGINES; k++)
         for (int r = 0; r < NUM_RUNGS; r++)
             free(runs[k].images[r]);

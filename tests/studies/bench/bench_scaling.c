@@ -3,7 +3,6 @@
 #include "bench.h"
 #include "bench_timing.h"
 #include "bench_tracers.h"
-#include "drawing.h"
 #include "tests/support/mesh.h"
 
 #include "renderer/transport/render.h"
@@ -12,28 +11,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <unistd.h>
-
-static bool write_plot(const struct bench_options *o, const char *file, struct drawing *p,
-                       struct err *e)
-{
-    char path[4096];
-    snprintf(path, sizeof path, "%s/%s.svg", o->out, file);
-    p->x.is_log = p->y.is_log = true;
-    /* A decade more than is needed, in powers of ten. */
-    p->x.lo = p->y.lo = INFINITY;
-    p->x.hi = p->y.hi = 0;
-    for (int k = 0; k < p->num; k++)
-        for (int i = 0; i < p->series[k].num; i++) {
-            p->x.lo = fmin(p->x.lo, p->series[k].x[i]);
-            p->x.hi = fmax(p->x.hi, p->series[k].x[i]);
-            p->y.lo = fmin(p->y.lo, p->series[k].y[i]);
-            p->y.hi = fmax(p->y.hi, p->series[k].y[i]);
-        }
-    p->y.lo = pow(10, floor(log10(p->y.lo)));
-    p->y.hi = pow(10, ceil(log10(p->y.hi * 1.001)));
-    p->x.hi *= 1.001;
-    return drawing_write(path, p, e);
-}
 
 struct at_size {
     double triangles, build[2], mrays[2], bytes; /* 0: ours, 1: Embree's; seconds */
@@ -86,17 +63,8 @@ static struct at_size measure_mesh(const struct bench_options *o, uint32_t trian
     return out;
 }
 
-static bool by_triangles(const struct bench_options *o, json_t *all, struct err *e)
+static void by_triangles(const struct bench_options *o, json_t *all)
 {
-    static const char *const names[] = {"ours", "Embree"};
-    struct drawing build = {.title = "Building the hierarchy, one thread",
-                            .x.label = "triangles",
-                            .y.label = "CPU s",
-                            .num = 2},
-                   rays = {.title = "A ray in a random direction from the surface",
-                           .x.label = "triangles",
-                           .y.label = "CPU s",
-                           .num = 2};
     json_t *rows = json_array();
     printf("%-10s %11s %11s %8s %10s %10s %8s %7s\n", "triangles", "build s", "Embree's", "ratio",
            "Mrays/s", "Embree's", "ratio", "B/tri");
@@ -105,21 +73,12 @@ static bool by_triangles(const struct bench_options *o, json_t *all, struct err 
         printf("%-10.0f %11.5f %11.5f %8.2f %10.2f %10.2f %8.2f %7.1f\n", r.triangles, r.build[0],
                r.build[1], r.build[1] / r.build[0], r.mrays[0], r.mrays[1], r.mrays[0] / r.mrays[1],
                r.bytes);
-        for (int j = 0; j < 2; j++) {
-            drawing_add(&build.series[j], r.triangles, r.build[j], r.build[j], r.build[j]);
-            double each = 1e-6 / r.mrays[j];
-            drawing_add(&rays.series[j], r.triangles, each, each, each);
-            snprintf(build.series[j].name, sizeof build.series[j].name, "%s", names[j]);
-            snprintf(rays.series[j].name, sizeof rays.series[j].name, "%s", names[j]);
-        }
         json_array_append_new(rows, json_pack("{s:f,s:[f,f],s:[f,f],s:f}", "triangles", r.triangles,
                                               "build_cpu_s", r.build[0], r.build[1],
                                               "mrays_per_cpu_second", r.mrays[0], r.mrays[1],
                                               "bytes_per_triangle", r.bytes));
     }
     json_object_set_new(all, "triangles", rows);
-    return write_plot(o, "cost_triangles_build", &build, e) &&
-           write_plot(o, "cost_triangles_ray", &rays, e);
 }
 
 /* A render of 44_mesh, or its first pass. */
@@ -163,19 +122,14 @@ static bool measure_render(const struct bench_options *o, const struct bench_sce
 
 enum kind { BY_THREADS, BY_PIXELS, BY_SAMPLES };
 
-/* One table and plot; `first` and twice, or four times as much each, up to `last`. */
+/* One table; `first` and twice, or four times as much each, up to `last`. */
 static bool by(const struct bench_options *o, const struct bench_scene *s, enum kind kind,
                int first, int last, json_t *all, struct err *e)
 {
     static const char *const words[] = {"threads", "pixels", "samples"};
-    struct drawing p = {.title = "44_mesh", .x.label = words[kind], .y.label = "s", .num = 2};
-    char file[64];
     json_t *rows = json_array();
     bool ok = true;
     const int side = o->smoke ? 16 : 128, spp = o->smoke ? 1 : 16;
-    snprintf(p.series[0].name, sizeof p.series[0].name, "CPU");
-    snprintf(p.series[1].name, sizeof p.series[1].name, "wall");
-    snprintf(file, sizeof file, "cost_%s", words[kind]);
     printf("%-10s %11s %11s %14s\n", words[kind], "wall s", "CPU s", "CPU us a path");
     for (int n = first; ok && n <= last; n *= kind == BY_SAMPLES ? 4 : 2) {
         double wall, cpu;
@@ -186,13 +140,11 @@ static bool by(const struct bench_options *o, const struct bench_scene *s, enum 
         double x = kind == BY_PIXELS ? (double)n * n : n;
         printf("%-10.0f %11.4f %11.4f %14.3f\n", x, wall, cpu,
                cpu / ((double)width * width * samples) * 1e6);
-        drawing_add(&p.series[0], x, cpu, cpu, cpu);
-        drawing_add(&p.series[1], x, wall, wall, wall);
         json_array_append_new(
             rows, json_pack("{s:f,s:f,s:f}", words[kind], x, "wall_s", wall, "cpu_s", cpu));
     }
     json_object_set_new(all, words[kind], rows);
-    return ok && write_plot(o, file, &p, e);
+    return ok;
 }
 
 json_t *bench_scaling(const struct bench_options *o, bool *wrong, struct err *e)
@@ -204,8 +156,9 @@ json_t *bench_scaling(const struct bench_options *o, bool *wrong, struct err *e)
     printf(
         "Medians of %d rounds. Building and rays: one thread. Wall times hold on an idle machine only.\n",
         o->rounds);
-    bool ok = by_triangles(o, all, e);
-    if (ok && bench_scene_load("44_mesh", &s)) {
+    bool ok = true;
+    by_triangles(o, all);
+    if (bench_scene_load("44_mesh", &s)) {
         ok = by(o, &s, BY_THREADS, 1, o->smoke ? 2 : threads, all, e) &&
              by(o, &s, BY_PIXELS, o->smoke ? 8 : 32, o->smoke ? 16 : 512, all, e) &&
              by(o, &s, BY_SAMPLES, 1, o->smoke ? 4 : 256, all, e);

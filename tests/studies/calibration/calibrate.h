@@ -70,9 +70,10 @@ struct weak_results {
     struct checks checks[NUM_WEAKNESSES];
 };
 
-/* The page: writes README.md and the plots into `dir`, which it makes. `command` made them. */
+/* The page: writes README.md and the plots into `dir`, which it makes. `command` made them, all: calibrate_check(). */
 NODISCARD bool page_write(const char *dir, const char *command, const struct settings *s,
-                          const struct results *r, const struct weak_results *weak, struct err *e);
+                          const struct results *r, const struct checks *all,
+                          const struct weak_results *weak, struct err *e);
 
 /* The plots alone: false_alarms.svg, statistics.svg, tail.svg, power.svg. */
 NODISCARD bool page_draw(const char *dir, const struct settings *s, const struct results *r,

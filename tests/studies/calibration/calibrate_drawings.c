@@ -1,14 +1,93 @@
 #include "calibrate.h"
 
-#include "tests/studies/bench/drawing.h"
 #include "tests/support/rates.h"
 
+#include "renderer/base/fs.h"
+#include "tools/plots/plot.h"
+
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
 static const enum law laws[] = {LAW_NORMAL, LAW_EXPONENTIAL, LAW_BLACK, LAW_PARETO, LAW_LOGNORMAL};
 enum { NUM_LAWS = sizeof laws / sizeof *laws };
+
+/* Lines with error bars. */
+enum { DRAWING_POINTS = 48, DRAWING_SERIES = 8 };
+
+struct drawing_series {
+    char name[64];
+    int num;
+    double x[DRAWING_POINTS], y[DRAWING_POINTS];
+    double lo[DRAWING_POINTS], hi[DRAWING_POINTS]; /* of the error bar; equal: none */
+};
+
+struct drawing {
+    const char *title;
+    struct plot_axis x, y;
+    bool is_diagonal;      /* the line y = x */
+    double mark_x, mark_y; /* dashed lines; 0: none */
+    const char *mark_text; /* beside the first */
+    int num;
+    struct drawing_series series[DRAWING_SERIES];
+};
+
+/* Appends a point; what the axes cannot show is cut at their ends. */
+static void drawing_add(struct drawing_series *s, double x, double y, double lo, double hi)
+{
+    assert(s->num < DRAWING_POINTS);
+    s->x[s->num] = x;
+    s->y[s->num] = y;
+    s->lo[s->num] = lo;
+    s->hi[s->num++] = hi;
+}
+
+static void draw_series(struct plot *p, const struct drawing_series *s, size_t number)
+{
+    plot_series(p, number, s->name);
+    for (int i = 0; i < s->num; i++) {
+        plot_line_to(p, s->x[i], s->y[i]);
+        if (s->hi[i] > s->lo[i]) {
+            plot_segment(p, "line", s->x[i], s->lo[i], s->x[i], s->hi[i]);
+            plot_point(p, number, s->x[i], s->y[i], "%s: %.3g at %.3g, %.3g to %.3g", s->name,
+                       s->y[i], s->x[i], s->lo[i], s->hi[i]);
+        } else {
+            plot_point(p, number, s->x[i], s->y[i], "%s: %.3g at %.3g", s->name, s->y[i], s->x[i]);
+        }
+    }
+    plot_series_end(p);
+}
+
+/* A file of its own, readable on light and on dark ground. */
+static bool save(const char *dir, const char *name, const struct drawing *d, struct err *e)
+{
+    struct out_file out;
+    if (!out_open(&out, fs_path("%s/%s.svg", dir, name).s, e))
+        return false;
+    struct plot p = plot_sized(out.f, 430, 330);
+    p.title = d->title;
+    p.top = 40;
+    p.right = 210;
+    p.x = d->x;
+    p.y = d->y;
+    p.x.has_grid = p.y.has_grid = true;
+    plot_open(&p, "%s", d->title);
+    if (d->is_diagonal) {
+        double lo = fmax(d->x.lo, d->y.lo), hi = fmin(d->x.hi, d->y.hi);
+        plot_segment(&p, "expected", lo, lo, hi, hi);
+    }
+    if (d->mark_x > 0) {
+        plot_segment(&p, "expected", d->mark_x, d->y.lo, d->mark_x, d->y.hi);
+        plot_text(&p, d->mark_x, d->y.lo, -5, -8, "end", "%s", d->mark_text);
+    }
+    if (d->mark_y > 0)
+        plot_segment(&p, "expected", d->x.lo, d->mark_y, d->x.hi, d->mark_y);
+    for (int i = 0; i < d->num; i++)
+        draw_series(&p, &d->series[i], (size_t)i);
+    plot_close(&p);
+    return out_commit(&out, e);
+}
 
 /* Observed rate against p, from a pool of results, down to where one pair in the pool is left. */
 static void add_curve(struct drawing_series *s, const struct null_result *pool, int column,
@@ -20,13 +99,6 @@ static void add_curve(struct drawing_series *s, const struct null_result *pool, 
         if (rate > 0)
             drawing_add(s, pow(10, -i / 8.0), rate, 0, 0);
     }
-}
-
-static bool save(const char *dir, const char *name, const struct drawing *p, struct err *e)
-{
-    char path[4096];
-    snprintf(path, sizeof path, "%s/%s.svg", dir, name);
-    return drawing_write(path, p, e);
 }
 
 /* Of rates over what was asked for, both as logarithms. */

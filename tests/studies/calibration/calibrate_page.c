@@ -6,7 +6,6 @@
 #include "renderer/base/version.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* "0.0103 [0.0081, 0.0128]" */
@@ -330,33 +329,26 @@ static void weakened(FILE *f, const struct weak_results *weak)
 }
 
 bool page_write(const char *dir, const char *command, const struct settings *s,
-                const struct results *r, const struct weak_results *weak, struct err *e)
+                const struct results *r, const struct checks *all, const struct weak_results *weak,
+                struct err *e)
 {
-    char path[4096];
     struct out_file out;
-    struct checks *all = calloc(1, sizeof *all);
-    if (all == NULL)
-        return err_set(e, "out of memory for the acceptance lines");
-    calibrate_check(s, r, all);
-    snprintf(path, sizeof path, "%s/README.md", dir);
-    bool ok = fs_make_dirs(dir, e) && page_draw(dir, s, r, e) && out_open(&out, path, e);
-    if (ok) {
-        heading(out.f, command, s, all);
-        false_alarms(out.f, s, r);
-        tails(out.f, s, r);
-        uniformity(out.f, s, r);
-        power(out.f, s, r);
-        intervals(out.f, s, r);
-        gates(out.f, s, r);
-        weakened(out.f, weak);
-        if (all->failed > 0) {
-            fputs("\n## What does not hold\n", out.f);
-            for (int i = 0; i < all->num; i++)
-                if (!all->item[i].holds)
-                    fprintf(out.f, "- %s\n", all->item[i].what);
-        }
-        ok = out_commit(&out, e);
+    if (!fs_make_dirs(dir, e) || !page_draw(dir, s, r, e) ||
+        !out_open(&out, fs_path("%s/README.md", dir).s, e))
+        return false;
+    heading(out.f, command, s, all);
+    false_alarms(out.f, s, r);
+    tails(out.f, s, r);
+    uniformity(out.f, s, r);
+    power(out.f, s, r);
+    intervals(out.f, s, r);
+    gates(out.f, s, r);
+    weakened(out.f, weak);
+    if (all->failed > 0) {
+        fputs("\n## What does not hold\n", out.f);
+        for (int i = 0; i < all->num; i++)
+            if (!all->item[i].holds)
+                fprintf(out.f, "- %s\n", all->item[i].what);
     }
-    free(all);
-    return ok;
+    return out_commit(&out, e);
 }

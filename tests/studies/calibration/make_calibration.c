@@ -4,10 +4,11 @@
 
 #include "renderer/base/cli.h"
 
-#include <stdlib.h>
+#include <stdio.h>
 
 struct arguments {
     int threads, num_out;
+    bool help;
     double share;
     const char *out[1];
 };
@@ -15,44 +16,40 @@ struct arguments {
 static const struct cli_option options[] = {
     {0, "threads", "N", "2", CLI_TO(struct arguments, threads), 1, 64},
     {0, "share", "S", "of the pairs (1)", CLI_TO(struct arguments, share), 1e-9, 1},
+    {'h', "help", "", "print this", CLI_TO(struct arguments, help),
+     .usage = "usage: make_calibration [--threads N] [--share S] OUT\n"},
     {.noun = "directories", CLI_TO_LIST(struct arguments, out, num_out)}};
 
 static bool measure(const struct arguments *a, int *failed, struct err *e)
 {
     struct settings s = settings_published(a->share);
     struct settings few = settings_short();
-    struct results *r = calloc(1, sizeof *r), *short_r = calloc(1, sizeof *short_r);
-    struct weak_results *weak = calloc(1, sizeof *weak);
-    struct checks *all = calloc(1, sizeof *all);
+    static struct results r, short_r;
+    static struct weak_results weak;
+    static struct checks all;
     struct work w = {.threads = a->threads,
                      .total = calibrate_cost(&s) + NUM_WEAKNESSES * calibrate_cost(&few)};
     char command[256] = "make calibrate";
     if (a->share < 1)
         snprintf(command, sizeof command, "make calibrate SHARE=%g", a->share);
-    bool ok = (r != NULL && short_r != NULL && weak != NULL && all != NULL) ||
-              err_set(e, "out of memory for the results");
+    bool ok = true;
     progress_start(&w.progress, "calibrating", NULL, false);
     for (int i = 0; ok && i < NUM_WEAKNESSES; i++) {
-        ok = calibrate(&w, &few, "reference/scenes", (enum weakness)i, short_r, e);
+        ok = calibrate(&w, &few, "reference/scenes", (enum weakness)i, &short_r, e);
         if (ok)
-            calibrate_check(&few, short_r, &weak->checks[i]);
+            calibrate_check(&few, &short_r, &weak.checks[i]);
     }
-    ok = ok && calibrate(&w, &s, "reference/scenes", WEAK_NOT, r, e);
+    ok = ok && calibrate(&w, &s, "reference/scenes", WEAK_NOT, &r, e);
     progress_end(&w.progress, w.total);
-    ok = ok && page_write(a->out[0], command, &s, r, weak, e);
-    if (ok) {
-        calibrate_check(&s, r, all);
-        for (int i = 0; i < all->num; i++)
-            if (!all->item[i].holds)
-                printf("does not hold: %s\n", all->item[i].what);
-        printf("%d lines, %d do not hold: %s/README.md\n", all->num, all->failed, a->out[0]);
-        *failed = all->failed;
-    }
-    free(r);
-    free(short_r);
-    free(weak);
-    free(all);
-    return ok;
+    if (!ok)
+        return false;
+    calibrate_check(&s, &r, &all);
+    for (int i = 0; i < all.num; i++)
+        if (!all.item[i].holds)
+            printf("does not hold: %s\n", all.item[i].what);
+    printf("%d lines, %d do not hold: %s/README.md\n", all.num, all.failed, a->out[0]);
+    *failed = all.failed;
+    return page_write(a->out[0], command, &s, &r, &all, &weak, e);
 }
 
 int main(int argc, char **argv)
@@ -60,10 +57,10 @@ int main(int argc, char **argv)
     struct arguments a = {.threads = 2, .share = 1};
     struct err e = {""};
     int failed = 0;
-    bool ok =
-        cli_read(options, argc, argv, &a, &e) &&
-        (a.num_out == 1 || err_set(&e, "usage: make_calibration [--threads N] [--share S] OUT"));
-    if (!ok || !measure(&a, &failed, &e)) {
+    bool ok = cli_read(options, argc, argv, &a, &e) &&
+              (a.help || ((a.num_out == 1 || err_set(&e, "one directory is needed")) &&
+                          measure(&a, &failed, &e)));
+    if (!ok) {
         fprintf(stderr, "make_calibration: %s\n", e.msg);
         return 3;
     }

@@ -2,7 +2,6 @@
 
 #include "renderer/base/fs.h"
 #include "renderer/image/tone.h"
-#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #include <gsl/gsl_randist.h>
@@ -54,7 +53,7 @@ static bool make_answer_of(const struct rubric *r, const struct catalogue *c, in
 bool bug_images_start(struct bug_images *b, const char *rubric)
 {
     struct rubric_mistakes mistakes;
-    OWN(catalogue) c;
+    struct catalogue c;
     struct err e;
     *b = (struct bug_images){.rng = gsl_rng_alloc(gsl_rng_mt19937),
                              .rubric = calloc(1, sizeof *b->rubric),
@@ -72,6 +71,7 @@ bool bug_images_start(struct bug_images *b, const char *rubric)
             ok = make_answer_of(b->rubric, &c, k, i, &b->answers->of[k][i].m);
         ok = ok && (v == NULL || make_answer(v, p, 0, &b->answers->of[0][i].noise));
     }
+    catalogue_free(&c);
     return ok && rubric_bugs_open(b->rubric, b->answers, &b->bugs, &e);
 }
 
