@@ -89,14 +89,5 @@ INLINE vu vu_set(uint32_t x)
 {
     return (vu)vi_set((int32_t)x);
 }
-/* f of the lanes of a mask, one by one; the others stay. For what is rare and has no short form in vectors. */
-INLINE vf vf_map(float (*f)(float), unsigned mask, vf a)
-{
-    for (; mask; mask &= mask - 1) {
-        int i = __builtin_ctz(mask);
-        LANE(a, i) = f(LANE(a, i));
-    }
-    return a;
-}
 
 #endif

@@ -4,14 +4,11 @@
 #ifndef ASSAY_MICROFACET_H
 #define ASSAY_MICROFACET_H
 
+#include "renderer/math/exp.h"
 #include "renderer/math/warp.h"
 #include "renderer/scene/scene.h"
 
 #define MICROFACET_SQRT_PI 1.77245385090551602730f
-
-/* The slope s at which the integral of (1 - s t) exp(-s^2) is the fraction u of what a viewer at tan(theta) = t sees
- * of all slopes; t = 0 gives a normal variate of variance 1/2. */
-float microfacet_slope(float t, float u);
 
 INLINE unsigned microfacet_beckmanns(vi kind)
 {
@@ -28,9 +25,9 @@ INLINE vf microfacet_d(vi kind, vf alpha, vec3v m)
     unsigned beckmann = microfacet_beckmanns(kind);
     if (beckmann) {
         e = sin2 / (cos2 * a2);
-        /* expf() is 0 there, and cos2 may be. */
-        vi near = vf_lt(e, vf_set(100));
-        vf b = vf_map(expf, beckmann & bits(near), -e) * INV_PI_F / (a2 * cos2 * cos2);
+        /* The exponential is 0 there, and cos2 may be. */
+        vi near = vf_lt(e, vf_set(87));
+        vf b = exp_negative(-e) * INV_PI_F / (a2 * cos2 * cos2);
         d = vf_select(lanes_of(beckmann), vf_select(near, b, vf_set(0)), d);
     }
     return vf_select(vf_le(m.z, vf_set(0)), vf_set(0), d);
@@ -46,18 +43,17 @@ INLINE vf microfacet_lambda(vi kind, vf alpha, vec3v w)
     unsigned beckmann = microfacet_beckmanns(kind);
     if (beckmann) {
         vf a = 1 / (alpha * vf_sqrt(tan2));
-        unsigned slant = beckmann & ~bits(upright);
-        vf b = vf_map(expf, slant, -a * a) / (a * MICROFACET_SQRT_PI) - vf_map(erfcf, slant, a);
+        vf b = exp_negative(-a * a) * (1 / (a * MICROFACET_SQRT_PI) - exp_erfcx(a));
         l = vf_select(lanes_of(beckmann), 0.5f * b, l);
     }
     return vf_select(upright, vf_set(0), l);
 }
 
 /* Lambda of MICROFACET_BECKMANN_STARTER. */
-INLINE vf microfacet_starter_lambda(unsigned lanes, vf alpha, vec3v w)
+INLINE vf microfacet_starter_lambda(vf alpha, vec3v w)
 {
     vf tan2 = (w.x * w.x + w.y * w.y) / (w.z * w.z), a = 1 / (alpha * vf_sqrt(tan2));
-    vf l = 0.5f * (vf_map(expf, lanes, -a * a) / (a * PI_F) - vf_map(erfcf, lanes, a));
+    vf l = 0.5f * exp_negative(-a * a) * (1 / (a * PI_F) - exp_erfcx(a));
     return vf_select(vf_lt(vf_set(0), tan2), l, vf_set(0));
 }
 
@@ -70,10 +66,10 @@ INLINE vf microfacet_g2(vi kind, vf alpha, vi separable, vec3v wo, vec3v wi)
     vf g = vf_select(separable, 1 / ((1 + lo) * (1 + li)), 1 / (1 + lo + li));
     unsigned starter = bits(vi_eq(kind, vi_set(MICROFACET_BECKMANN_STARTER)));
     if (starter)
-        g = vf_select(lanes_of(starter),
-                      1 / (1 + microfacet_starter_lambda(starter, alpha, wo) +
-                           microfacet_starter_lambda(starter, alpha, wi)),
-                      g);
+        g = vf_select(
+            lanes_of(starter),
+            1 / (1 + microfacet_starter_lambda(alpha, wo) + microfacet_starter_lambda(alpha, wi)),
+            g);
     return g;
 }
 
@@ -96,6 +92,35 @@ INLINE vec3v microfacet_sample_ggx(vf alpha, vec3v wo, vf u, vf v)
     return normalizev(v3v(alpha * n.x, alpha * n.y, vf_max(vf_set(1e-7f), n.z)));
 }
 
+/* Integral of (1 - s t) exp(-s^2) over s < x; e = exp(-x^2): the slopes towards a viewer at tan(theta) = t. */
+INLINE vf microfacet_slope_integral(vf x, vf t, vf e)
+{
+    vf tail = e * exp_erfcx(vf_abs(x));
+    tail = vf_select(vf_lt(x, vf_set(0)), tail, 2 - tail);
+    return 0.5f * MICROFACET_SQRT_PI * tail + 0.5f * t * e;
+}
+
+/* The slope s at which the integral of (1 - s t) exp(-s^2) is the fraction u of what a viewer at tan(theta) = t sees
+ * of all slopes; t = 0 gives a normal variate of variance 1/2. Newton's method inside a shrinking bracket; `lanes` are wanted. */
+INLINE vf microfacet_slope(unsigned lanes, vf t, vf u)
+{
+    const vf zero = vf_set(0), accuracy = vf_set(1e-6f), top = vf_set(6);
+    vf lo = -top, hi = vf_select(vf_lt(1 / top, t), 1 / t, top), x = zero;
+    vf all = microfacet_slope_integral(hi, t, exp_negative(-hi * hi));
+    for (int i = 0; i < 30 && lanes; i++) {
+        const vi live = lanes_of(lanes);
+        vf e = exp_negative(-x * x), f = microfacet_slope_integral(x, t, e) - u * all;
+        vi above = vf_lt(zero, f);
+        hi = vf_select(above & live, x, hi);
+        lo = vf_select(~above & live, x, lo);
+        vf next = x - f / ((1 - x * t) * e);
+        next = vf_select(vf_lt(lo, next) & vf_lt(next, hi), next, 0.5f * (lo + hi));
+        lanes &= ~bits(vf_lt(vf_abs(next - x), accuracy) | vf_lt(hi - lo, accuracy));
+        x = vf_select(live, next, x);
+    }
+    return x;
+}
+
 /* Slopes along wo and across. */
 INLINE vec3v microfacet_sample_beckmann(unsigned lanes, vf alpha, vec3v wo, vf u, vf v)
 {
@@ -104,12 +129,7 @@ INLINE vec3v microfacet_sample_beckmann(unsigned lanes, vf alpha, vec3v wo, vf u
     vf sin_w = vf_sqrt(w.x * w.x + w.y * w.y), t = sin_w / w.z;
     vi slant = vf_lt(zero, sin_w);
     vf c = vf_select(slant, w.x / sin_w, vf_set(1)), s = vf_select(slant, w.y / sin_w, zero);
-    vf along = zero, across = zero;
-    for (; lanes; lanes &= lanes - 1) {
-        int i = __builtin_ctz(lanes);
-        LANE(along, i) = microfacet_slope(LANE(t, i), LANE(u, i));
-        LANE(across, i) = microfacet_slope(0, LANE(v, i));
-    }
+    vf along = microfacet_slope(lanes, t, u), across = microfacet_slope(lanes, zero, v);
     return normalizev(
         v3v(-alpha * (c * along - s * across), -alpha * (s * along + c * across), vf_set(1)));
 }
