@@ -1,6 +1,6 @@
 /* The loader by the cases of geometry.cases, look.cases and light.cases, whose expected numbers were derived by hand beside
  * each case, of refused.cases, and by documents that no file should hold. A case:
- *     = NAME            or "+ NAME", which keeps the pieces of the case before
+ *     = NAME            or "+ NAME", which keeps the pieces of the case before, and what is expected where it says nothing of it
  *     dialect cgl       or collada; without it the file's own
  *     asset, effect, mesh, libraries, nodes: the pieces of dae.h; a line that begins with a blank goes on
  *     fails KEYWORD     in the line of the error; or, as many as tell something:
@@ -15,14 +15,16 @@
 
 #include <ctype.h>
 
-static void put(FILE *f, const char *key, vec3 v)
+/* i: the number in the key. */
+static void put(FILE *f, const char *key, uint32_t i, vec3 v)
 {
-    fprintf(f, "%s %.9g %.9g %.9g\n", key, (double)v.x, (double)v.y, (double)v.z);
+    fprintf(f, key, i); // NOLINT(clang-diagnostic-format-nonliteral)
+    fprintf(f, " %.9g %.9g %.9g\n", (double)v.x, (double)v.y, (double)v.z);
 }
 
-static void put_rgb(FILE *f, const char *key, rgb c)
+static void put_rgb(FILE *f, const char *key, uint32_t i, rgb c)
 {
-    put(f, key, v3(c.r, c.g, c.b));
+    put(f, key, i, v3(c.r, c.g, c.b));
 }
 
 static const vec3 *corners(const struct scene *s, uint32_t triangle)
@@ -42,19 +44,15 @@ static void put_triangles(FILE *f, const struct scene *s)
     int notch = 0; /* triangles whose middle is beyond x = y = 1 */
     for (uint32_t i = 0; i < s->num_triangles; i++) {
         const vec3 *p = corners(s, i), n = front(p);
-        char key[32];
         area += 0.5 * length(n);
         notch += p[0].x + p[1].x + p[2].x > 3 && p[0].y + p[1].y + p[2].y > 3;
-        snprintf(key, sizeof key, "t%u.front", i);
-        put(f, key, normalize(n));
+        put(f, "t%u.front", i, normalize(n));
         fprintf(f, "t%u.object %s\nt%u.material %s\nt%u.light %d\n", i,
                 s->objects[s->tri_object[i]].name, i, s->materials[s->tri_material[i]].name, i,
                 s->tri_light[i]);
         for (uint32_t k = 3 * i; k < 3 * i + 3; k++) {
-            snprintf(key, sizeof key, "p%u", k);
-            put(f, key, s->position[k]);
-            snprintf(key, sizeof key, "n%u", k);
-            put(f, key, s->normal[k]);
+            put(f, "p%u", k, s->position[k]);
+            put(f, "n%u", k, s->normal[k]);
         }
     }
     fprintf(f, "area %.9g\nnotch %d\n", area, notch);
@@ -85,27 +83,23 @@ static void put_lights(FILE *f, const struct scene *s)
                                        "triangles", "sphere", "environment"};
     for (uint32_t i = 0; i < s->num_lights; i++) {
         const struct light *l = &s->lights[i];
-        char key[5][32];
-        for (int k = 0; k < 5; k++)
-            snprintf(key[k], sizeof *key, "l%u.%s", i,
-                     (const char *[]){"value", "position", "axis", "to_light", "attenuation"}[k]);
         fprintf(
             f, "l%u.kind %s\nl%u.cos_cutoff %.9g\nl%u.exponent %.9g\nl%u.area %.9g\nl%u.count %u\n",
             i, kind[l->kind], i, (double)l->cos_cutoff, i, (double)l->exponent, i, (double)l->area,
             i, l->count);
-        put_rgb(f, key[0], l->value);
-        put(f, key[1], l->position);
-        put(f, key[2], l->axis);
-        put(f, key[3], l->to_light);
-        put(f, key[4], v3(l->attenuation[0], l->attenuation[1], l->attenuation[2]));
+        put_rgb(f, "l%u.value", i, l->value);
+        put(f, "l%u.position", i, l->position);
+        put(f, "l%u.axis", i, l->axis);
+        put(f, "l%u.to_light", i, l->to_light);
+        put(f, "l%u.attenuation", i, v3(l->attenuation[0], l->attenuation[1], l->attenuation[2]));
         fprintf(f, "l%u.corners", i);
         if (l->kind == LIGHT_TRIANGLES)
             put_corners(f, s, l);
         fputc('\n', f);
     }
     if (s->environment != NULL) {
-        put_rgb(f, "sky.above", environment_radiance(s->environment, v3(0, 1, 0)));
-        put_rgb(f, "sky.below", environment_radiance(s->environment, v3(0, -1, 0)));
+        put_rgb(f, "sky.above", 0, environment_radiance(s->environment, v3(0, 1, 0)));
+        put_rgb(f, "sky.below", 0, environment_radiance(s->environment, v3(0, -1, 0)));
         fprintf(f, "sky.hidden %d\nsky.light %d\n", environment_is_hidden(s->environment),
                 s->environment_light);
     }
@@ -117,11 +111,6 @@ static void put_materials(FILE *f, const struct scene *s)
                                        "glass",   "microfacet", "plastic"};
     for (uint32_t i = 0; i < s->num_materials; i++) {
         const struct material *m = &s->materials[i];
-        char key[7][32];
-        for (int k = 0; k < 7; k++)
-            snprintf(key[k], sizeof *key, "m%u.%s", i,
-                     (const char *[]){"reflectance", "transmittance", "radiance", "eta", "k",
-                                      "specular", "mirror"}[k]);
         fprintf(
             f,
             "m%u.name %s\nm%u.kind %s\nm%u.both_sides %d\nm%u.ior %.9g\nm%u.schlick %d\nm%u.alpha %.9g\n",
@@ -130,13 +119,13 @@ static void put_materials(FILE *f, const struct scene *s)
         fprintf(f, "m%u.microfacet %s %s %s\n", i,
                 m->microfacet == MICROFACET_GGX ? "ggx" : "beckmann",
                 m->separable ? "separable" : "correlated", m->conductor ? "conductor" : "constant");
-        put_rgb(f, key[0], m->reflectance);
-        put_rgb(f, key[1], m->transmittance);
-        put_rgb(f, key[2], m->radiance);
-        put_rgb(f, key[3], m->eta);
-        put_rgb(f, key[4], m->k);
-        put_rgb(f, key[5], m->specular);
-        put_rgb(f, key[6], m->mirror);
+        put_rgb(f, "m%u.reflectance", i, m->reflectance);
+        put_rgb(f, "m%u.transmittance", i, m->transmittance);
+        put_rgb(f, "m%u.radiance", i, m->radiance);
+        put_rgb(f, "m%u.eta", i, m->eta);
+        put_rgb(f, "m%u.k", i, m->k);
+        put_rgb(f, "m%u.specular", i, m->specular);
+        put_rgb(f, "m%u.mirror", i, m->mirror);
     }
 }
 
@@ -160,14 +149,14 @@ static char *dump(const struct scene *s)
     for (uint32_t i = 0; i < s->num_cameras; i++)
         fprintf(f, " %s", s->cameras[i].name);
     fputc('\n', f);
-    put(f, "right", c->right);
-    put(f, "up", c->up);
-    put(f, "backward", c->backward);
-    put(f, "eye", c->eye);
-    put(f, "bounds_min", s->bounds_min);
-    put(f, "bounds_max", s->bounds_max);
-    put(f, "frame_min", s->frame_min);
-    put(f, "frame_max", s->frame_max);
+    put(f, "right", 0, c->right);
+    put(f, "up", 0, c->up);
+    put(f, "backward", 0, c->backward);
+    put(f, "eye", 0, c->eye);
+    put(f, "bounds_min", 0, s->bounds_min);
+    put(f, "bounds_max", 0, s->bounds_max);
+    put(f, "frame_min", 0, s->frame_min);
+    put(f, "frame_max", 0, s->frame_max);
     for (uint32_t i = 0; i < s->num_objects; i++)
         fprintf(f, "o%u.name %s\no%u.material %u\no%u.triangles %u %u\no%u.spheres %u %u\n", i,
                 s->objects[i].name, i, s->objects[i].material, i, s->objects[i].first_triangle,
@@ -177,9 +166,7 @@ static char *dump(const struct scene *s)
         const struct sphere *b = &s->spheres[i];
         fprintf(f, "s%u.radius %.9g\ns%u.normal_out %.9g\n", i, (double)b->radius, i,
                 (double)b->normal_out);
-        char key[32];
-        snprintf(key, sizeof key, "s%u.centre", i);
-        put(f, key, b->centre);
+        put(f, "s%u.centre", i, b->centre);
     }
     put_triangles(f, s);
     put_lights(f, s);
@@ -297,13 +284,24 @@ static void add_line(struct test_case *c, char *line)
     c->expected[c->num_expected++] = line;
 }
 
+/* What it does not say itself it expects as the one before. */
+static const struct test_case *complete(struct test_case *c, const struct test_case *before)
+{
+    if (*c->line == '+' && c->fails == NULL && c->num_expected == 0) {
+        c->fails = before->fails;
+        c->num_expected = before->num_expected;
+        memcpy(c->expected, before->expected, sizeof c->expected);
+    }
+    return c;
+}
+
 static void run_file(const char *path, int cases)
 {
     char *text = test_read(path), *rest = text, *line;
     /* Lines that go on become one. */
     for (char *at = text; (at = strstr(at, "\n ")) != NULL;)
         *at = ' ';
-    struct test_case c = {0};
+    struct test_case c = {0}, before = {0};
     int num = 0;
     while ((line = strsep(&rest, "\n")) != NULL) {
         if (*line == '\0' || *line == '#')
@@ -313,15 +311,15 @@ static void run_file(const char *path, int cases)
             continue;
         }
         if (num++ > 0)
-            run(&c);
-        struct test_case next = {.line = line};
+            run(complete(&c, &before));
+        before = c;
+        c = (struct test_case){.line = line};
         if (*line == '+') {
-            next.d = c.d;
-            next.dialect = c.dialect;
+            c.d = before.d;
+            c.dialect = before.dialect;
         }
-        c = next;
     }
-    run(&c);
+    run(complete(&c, &before));
     assert_int_equal(num, cases);
     free(text);
 }
