@@ -41,6 +41,14 @@ uint32_t build_material(struct scene *s, rgb reflectance, rgb radiance)
     return s->num_materials++;
 }
 
+uint32_t build_like(struct scene *s, struct material m)
+{
+    uint32_t i = build_material(s, m.reflectance, m.radiance);
+    memcpy(m.name, s->materials[i].name, sizeof m.name);
+    s->materials[i] = m;
+    return i;
+}
+
 static struct object *new_object(struct scene *s, uint32_t material)
 {
     assert(s->num_objects < ROOM);
@@ -80,11 +88,9 @@ void build_quad(struct scene *s, vec3 p, vec3 u, vec3 v, uint32_t material)
 uint32_t build_texture(struct scene *s, int width, int height, const rgb *colours, bool nearest,
                        enum texture_wrap wrap)
 {
-    struct err e;
     assert(s->num_images < ROOM);
     struct image *im = &s->images[s->num_images++];
-    if (!image_alloc(im, width, height, 3, (const char *const[]){"R", "G", "B"}, &e))
-        abort();
+    *im = build_image(width, height);
     memcpy(im->data, colours, (size_t)width * (size_t)height * sizeof *colours);
     s->textures[s->num_textures++] = (struct texture){.width = width,
                                                       .height = height,
@@ -118,10 +124,82 @@ void build_sphere(struct scene *s, vec3 centre, float radius, float normal_out, 
         (struct sphere){.centre = centre, .radius = radius, .normal_out = normal_out};
 }
 
+void build_join(struct scene *s, uint32_t first)
+{
+    struct object *o = &s->objects[first];
+    o->num_triangles = s->num_triangles - o->first_triangle;
+    for (uint32_t i = o->first_triangle; i < s->num_triangles; i++)
+        s->tri_object[i] = first;
+    s->num_objects = first + 1;
+}
+
+void build_box(struct scene *s, vec3 p, vec3 d, uint32_t material)
+{
+    vec3 x = {d.x, 0, 0}, y = {0, d.y, 0}, z = {0, 0, d.z}, q = add(p, d);
+    uint32_t first = s->num_objects;
+    build_quad(s, p, y, x, material);
+    build_quad(s, p, x, z, material);
+    build_quad(s, p, z, y, material);
+    build_quad(s, q, neg(x), neg(y), material);
+    build_quad(s, q, neg(z), neg(x), material);
+    build_quad(s, q, neg(y), neg(z), material);
+    build_join(s, first);
+}
+
 void build_light(struct scene *s, struct light light)
 {
     assert(s->num_lights < ROOM);
     s->lights[s->num_lights++] = light;
+}
+
+void build_point(struct scene *s, vec3 position, rgb value)
+{
+    build_light(s, (struct light){.kind = LIGHT_POINT,
+                                  .value = value,
+                                  .position = position,
+                                  .attenuation = {0, 0, 1}});
+}
+
+void build_spot(struct scene *s, vec3 position, vec3 axis, float cos_cutoff, float exponent,
+                rgb value)
+{
+    build_light(s, (struct light){.kind = LIGHT_SPOT,
+                                  .value = value,
+                                  .position = position,
+                                  .axis = axis,
+                                  .cos_cutoff = cos_cutoff,
+                                  .exponent = exponent,
+                                  .attenuation = {0, 0, 1}});
+}
+
+void build_sun(struct scene *s, vec3 to_light, rgb value)
+{
+    build_light(s, (struct light){.kind = LIGHT_DIRECTIONAL, .value = value, .to_light = to_light});
+}
+
+struct scene build_room(float radiance)
+{
+    struct scene s = build_scene();
+    uint32_t white = build_material(&s, grey(0.6f), grey(0));
+    uint32_t red = build_material(&s, (rgb){0.6f, 0.2f, 0.2f}, grey(0));
+    uint32_t lamp = build_material(&s, grey(0), grey(radiance));
+    build_quad(&s, v3(-1, 0, 1), v3(2, 0, 0), v3(0, 0, -2), white);
+    build_quad(&s, v3(-1, 1.5f, -1), v3(2, 0, 0), v3(0, 0, 2), white);
+    build_quad(&s, v3(-1, 0, -1), v3(2, 0, 0), v3(0, 1.5f, 0), white);
+    build_quad(&s, v3(-1, 0, 1), v3(0, 0, -2), v3(0, 1.5f, 0), red);
+    build_quad(&s, v3(-0.3f, 1.49f, -0.4f), v3(0.6f, 0, 0), v3(0, 0, 0.8f), lamp);
+    build_sphere(&s, v3(0.4f, 0.3f, 0.3f), 0.3f, 1, white);
+    build_camera(&s, v3(0, 0.75f, 3), 49);
+    return s;
+}
+
+struct image build_image(int width, int height)
+{
+    struct err e;
+    struct image im;
+    if (!image_alloc(&im, width, height, 3, (const char *const[]){"R", "G", "B"}, &e))
+        abort();
+    return im;
 }
 
 void build_camera(struct scene *s, vec3 eye, float hfov_degrees)

@@ -1,42 +1,52 @@
 #include "render_check.h"
 #include "test.h"
 
-#define Z_LIMIT  4.89
 #define ROUNDING 2e-5
 
 void check_finish(struct scene *s)
 {
     struct err e = {""};
-    if (!scene_finish(s, "test", &e))
-        fail_msg("%s", e.msg);
+    MUST(scene_finish(s, "test", &e));
+}
+
+struct integrator_options check_options(int direct, int depth, uint64_t seed)
+{
+    return (struct integrator_options){.kind = INTEGRATE_PATHS,
+                                       .direct = (enum direct_kind)direct,
+                                       .max_bounces = depth,
+                                       .light_samples = 1,
+                                       .roulette = ROULETTE_THROUGHPUT,
+                                       .sampler = {SAMPLER_INDEPENDENT, seed}};
+}
+
+struct moments check_render_all(const struct scene *s, const struct camera *c,
+                                const struct render_options *o, enum bvh_kind kind,
+                                struct render_stats *stats)
+{
+    struct err e = {""};
+    struct moments m;
+    struct render_stats unused;
+    struct progress p;
+    progress_start(&p, "test", NULL, true);
+    struct bvh *bvh = bvh_build(s, kind, &e);
+    MUST(bvh != NULL);
+    MUST(render(s, c, bvh, o, &p, &m, stats != NULL ? stats : &unused, &e));
+    bvh_free(bvh);
+    return m;
 }
 
 struct moments check_render(const struct scene *s, struct integrator_options io, int width,
                             int height, int spp)
 {
-    return check_render_with(s, io, width, height, spp, 1, BVH_SAH);
-}
-
-struct moments check_render_with(const struct scene *s, struct integrator_options io, int width,
-                                 int height, int spp, int threads, enum bvh_kind kind)
-{
     struct err e = {""};
     struct camera c;
-    struct moments m;
-    struct render_stats stats;
-    struct progress p;
-    progress_start(&p, "test", NULL, true);
-    assert_true(camera_init(&c, s, width, height, &e));
-    struct bvh *bvh = bvh_build(s, kind, &e);
-    assert_non_null(bvh);
-    struct render_options o = {.integrator = io,
-                               .width = width,
-                               .height = height,
-                               .num_samples = (uint32_t)spp,
-                               .threads = threads};
-    assert_true(render(s, &c, bvh, &o, &p, &m, &stats, &e));
-    bvh_free(bvh);
-    return m;
+    MUST(camera_init(&c, s, width, height, &e));
+    const struct render_options o = {.integrator = io,
+                                     .width = width,
+                                     .height = height,
+                                     .num_samples = (uint32_t)spp,
+                                     .threads = 1};
+    return check_render_all(s, &c, &o, BVH_SAH, NULL);
 }
 
 struct check_result check_pool(const struct moments *m)
@@ -53,34 +63,26 @@ struct check_result check_pool(const struct moments *m)
     return r;
 }
 
-bool check_result_agrees(const struct check_result *r, int channel, double expected)
+struct check_result check_look(const struct scene *s, struct integrator_options io, int size,
+                               int spp)
+{
+    struct moments m = check_render(s, io, size, size, spp);
+    struct check_result r = check_pool(&m);
+    moments_free(&m);
+    return r;
+}
+
+bool check_agrees(const struct check_result *r, int channel, double expected)
 {
     return fabs(r->mean[channel] - expected) <=
-           Z_LIMIT * r->std_error[channel] + ROUNDING * fabs(expected);
+           CHECK_Z_LIMIT * r->std_error[channel] + ROUNDING * fabs(expected);
 }
 
-void check_result_mean(const struct check_result *r, int channel, double expected, const char *what)
+void check_mean(const struct check_result *r, int channel, double expected, const char *what)
 {
-    if (!check_result_agrees(r, channel, expected))
+    if (!check_agrees(r, channel, expected))
         fail_msg("%s, channel %d: %.7g +- %.2g, expected %.7g", what, channel, r->mean[channel],
                  r->std_error[channel], expected);
-}
-
-bool check_agrees(const struct moments *m, int channel, double expected)
-{
-    struct check_result r = check_pool(m);
-    return check_result_agrees(&r, channel, expected);
-}
-
-void check_mean(const struct moments *m, int channel, double expected, const char *what)
-{
-    struct check_result r = check_pool(m);
-    check_result_mean(&r, channel, expected, what);
-}
-
-double check_std_error(const struct moments *m, int channel)
-{
-    return check_pool(m).std_error[channel];
 }
 
 double check_z(const struct moments *a, const struct moments *b, int channel)

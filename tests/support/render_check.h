@@ -10,29 +10,32 @@
 /* scene_finish(), or the test fails with its line. */
 void check_finish(struct scene *s);
 
-/* width x height pixels of spp paths, one thread. The caller frees the moments. */
+/* Two-sided at alpha = 1e-6. */
+#define CHECK_Z_LIMIT 4.89
+
+/* Paths of up to that many bounces, one sample of light, roulette by throughput, independent samples. */
+struct integrator_options check_options(int direct, int depth, uint64_t seed);
+
+/* render() by a hierarchy of that kind; stats may be NULL. The caller frees the moments. */
+struct moments check_render_all(const struct scene *s, const struct camera *c,
+                                const struct render_options *o, enum bvh_kind kind,
+                                struct render_stats *stats);
+/* width x height pixels of spp paths, on one thread. */
 struct moments check_render(const struct scene *s, struct integrator_options io, int width,
                             int height, int spp);
-struct moments check_render_with(const struct scene *s, struct integrator_options io, int width,
-                                 int height, int spp, int threads, enum bvh_kind kind);
 
 /* The mean over all pixels, each an equal estimate of the same number, and its standard error. */
 struct check_result {
     double mean[3], std_error[3];
 };
 struct check_result check_pool(const struct moments *m);
-bool check_result_agrees(const struct check_result *r, int channel, double expected);
-/* The same, or the test fails and says `what`. */
-void check_result_mean(const struct check_result *r, int channel, double expected,
-                       const char *what);
-
-/* Is the mean over all pixels, each an equal estimate of the same number, the expected one? Float
- * rounding along a path is allowed 2e-5 relative where there is no noise at all. */
-bool check_agrees(const struct moments *m, int channel, double expected);
-/* The same, or the test fails and says `what`. */
-void check_mean(const struct moments *m, int channel, double expected, const char *what);
-/* Standard error of that mean. */
-double check_std_error(const struct moments *m, int channel);
+/* Of an image of size x size pixels. */
+struct check_result check_look(const struct scene *s, struct integrator_options io, int size,
+                               int spp);
+/* Is it the expected one? Float rounding along a path is allowed 2e-5 relative where there is no noise at all. */
+bool check_agrees(const struct check_result *r, int channel, double expected);
+/* It is, or the test fails and says `what`. */
+void check_mean(const struct check_result *r, int channel, double expected, const char *what);
 /* Difference of the means of two independent images, in units of its standard error. */
 double check_z(const struct moments *a, const struct moments *b, int channel);
 

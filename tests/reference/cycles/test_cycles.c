@@ -326,8 +326,7 @@ TEST_WITH(only_fronts_emit, probe_setup, probe_teardown)
     uint32_t glow = build_material(&f->s, grey(.5f), (rgb){1, 2, 3});
     build_quad(&f->s, v3(-5, -5, -2), v3(5.015f, 0, 0), v3(0, 10, 0), glow);
     build_quad(&f->s, v3(.015f, -5, -2), v3(0, 10, 0), v3(5, 0, 0), glow);
-    build_light(&f->s, (struct light){
-                           .kind = LIGHT_DIRECTIONAL, .value = {1, 1, 1}, .to_light = {0, 0, 1}});
+    build_sun(&f->s, v3(0, 0, 1), grey(1));
     build_camera(&f->s, v3(0, 0, 0), 60);
     probe_render(f, &m);
     bool ok = true;

@@ -59,9 +59,7 @@ static int setup(void **state)
                                       .cos_cutoff = .7f,
                                       .exponent = 3.5f,
                                       .attenuation = {2, .25f, 0}});
-    build_light(
-        &f->s,
-        (struct light){.kind = LIGHT_DIRECTIONAL, .value = {3, 2, 1}, .to_light = {0, .6f, .8f}});
+    build_sun(&f->s, v3(0, .6f, .8f), (rgb){3, 2, 1});
     build_camera(&f->s, v3(.1f, 1, 4), 90);
     f->c = build_finish(&f->s, 40, 30);
     *state = f;

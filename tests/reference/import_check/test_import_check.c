@@ -61,19 +61,9 @@ static void make(struct fixture *f, char axis)
     build_triangle(&f->s, wall[0], wall[1], wall[2], grey_one);
     build_quad(&f->s, v3(0, 2, 0), v3(0, 0, .5f), v3(-.5f, 0, 0), lamp);
     build_sphere(&f->s, v3(0, 1, 0), .25f, 1, grey_one);
-    build_light(&f->s, (struct light){.kind = LIGHT_POINT,
-                                      .value = grey(1),
-                                      .position = v3(.5f, 1, .25f),
-                                      .attenuation = {0, 0, 1}});
-    build_light(&f->s, (struct light){.kind = LIGHT_SPOT,
-                                      .value = grey(1),
-                                      .position = v3(-.5f, 1, 0),
-                                      .axis = v3(0, -.6f, .8f),
-                                      .cos_cutoff = .5f,
-                                      .attenuation = {0, 0, 1}});
-    build_light(
-        &f->s,
-        (struct light){.kind = LIGHT_DIRECTIONAL, .value = grey(1), .to_light = v3(.6f, .8f, 0)});
+    build_point(&f->s, v3(.5f, 1, .25f), grey(1));
+    build_spot(&f->s, v3(-.5f, 1, 0), v3(0, -.6f, .8f), .5f, 0, grey(1));
+    build_sun(&f->s, v3(.6f, .8f, 0), grey(1));
     build_camera(&f->s, v3(.1f, 1, 4), 45);
     if (!scene_finish(&f->s, "test", &e) || !camera_init(&f->c, &f->s, 60, 40, &e))
         fail_msg("%s", e.msg);

@@ -53,8 +53,7 @@ TEST(the_text_is_that_of_the_description)
     build_sphere(&s, v3(.25f, .5f, -6), 1.5f, 1, 2);
     build_sphere(&s, v3(2, 3, -7), .5f, -1, 1);
     build_light(&s, point);
-    build_light(&s, (struct light){
-                        .kind = LIGHT_DIRECTIONAL, .value = {2, 4, 6}, .to_light = {0, .6f, .8f}});
+    build_sun(&s, v3(0, .6f, .8f), (rgb){2, 4, 6});
     build_light(&s, spot);
     build_camera(&s, v3(1, 2, 3), 53.13010235f);
     s.camera.right = v3(.6f, 0, -.8f);

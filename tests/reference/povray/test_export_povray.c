@@ -374,13 +374,8 @@ TEST(test_rotation)
     char *text[2];
     for (int by_hand = 0; by_hand < 2; by_hand++) {
         struct scene s = floor_and_ball(true);
-        build_light(&s, (struct light){.kind = LIGHT_POINT,
-                                       .value = {1, 2, 3},
-                                       .position = {.5f, 3, 2},
-                                       .attenuation = {0, 0, 1}});
-        build_light(&s, (struct light){.kind = LIGHT_DIRECTIONAL,
-                                       .value = {1, 2, 3},
-                                       .to_light = {.6f, .8f, 0}});
+        build_point(&s, v3(.5f, 3, 2), (rgb){1, 2, 3});
+        build_sun(&s, v3(.6f, .8f, 0), (rgb){1, 2, 3});
         struct camera c = build_finish(&s, 40, 30);
         struct povray_variant v = povray_variant_plain();
         if (by_hand) {

@@ -266,10 +266,7 @@ TEST(test_glass_meshes)
 TEST(test_mixed_lights)
 {
     struct scene s = ball_of(MATERIAL_DIFFUSE);
-    build_light(&s, (struct light){.kind = LIGHT_POINT,
-                                   .value = {1, 1, 1},
-                                   .position = {0, 1, 2},
-                                   .attenuation = {0, 0, 1}});
+    build_point(&s, v3(0, 1, 2), grey(1));
     build_sphere(&s, v3(.75f, 1, 0), .125f, 1, build_material(&s, grey(0), grey(2)));
     build_sphere(&s, v3(-.75f, 1, 0), .125f, 1, build_material(&s, grey(.5f), grey(2)));
     struct camera c = build_finish(&s, 40, 30);

@@ -338,9 +338,7 @@ TEST(test_direct_light)
         if (i < 2)
             build_light(&s, bulb);
         else if (i == 2)
-            build_light(&s, (struct light){.kind = LIGHT_DIRECTIONAL,
-                                           .value = value,
-                                           .to_light = {0, .8f, .6f}});
+            build_sun(&s, v3(0, .8f, .6f), value);
         else
             build_quad(&s, v3(-.3f, .7f, -.4f), v3(.5f, 0, 0), v3(0, 0, .7f),
                        build_material(&s, grey(0), value));

@@ -90,13 +90,7 @@ TEST(test_spot_light)
         build_quad(&s, v3(-2, 0, -2), v3(0, 0, 4), v3(4, 0, 0),
                    build_material(&s, (rgb){.8f, .5f, .3f}, grey(0)));
         look_down(&s, .5f);
-        build_light(&s, (struct light){.kind = LIGHT_SPOT,
-                                       .value = {2, 1, 3},
-                                       .position = {.2f, .7f, .1f},
-                                       .axis = normalize(v3(-.3f, -1, .1f)),
-                                       .cos_cutoff = (float)spot.cos_cutoff,
-                                       .exponent = 3,
-                                       .attenuation = {0, 0, 1}});
+        build_spot(&s, v3(.2f, .7f, .1f), normalize(v3(-.3f, -1, .1f)), (float)spot.cos_cutoff, 3, (rgb){2, 1, 3});
         struct moments m = exact_image(s, 5);
         int used;
         assert_true(worst_pixel(&m, under_spot, &spot, .4, &used) < 5e-4);
@@ -133,23 +127,6 @@ TEST(test_ball_lamp)
     assert_true(worst_pixel(&m, under_ball, &radius, 1, &used) < 1e-3);
     assert_false(worst_pixel(&m, under_ball, &wrong, 1, &used) < 1e-3);
     moments_free(&m);
-}
-
-/* Closed, its front outside; corner and diagonal have coordinates that floats hold and add exactly. */
-static void build_box(struct scene *s, vec3 p, vec3 d, uint32_t material)
-{
-    vec3 x = {d.x, 0, 0}, y = {0, d.y, 0}, z = {0, 0, d.z}, q = add(p, d);
-    uint32_t first = s->num_triangles, object = s->num_objects;
-    build_quad(s, p, y, x, material);
-    build_quad(s, p, x, z, material);
-    build_quad(s, p, z, y, material);
-    build_quad(s, q, neg(x), neg(y), material);
-    build_quad(s, q, neg(z), neg(x), material);
-    build_quad(s, q, neg(y), neg(z), material);
-    s->num_objects = object + 1;
-    s->objects[object].num_triangles = s->num_triangles - first;
-    for (uint32_t i = first; i < s->num_triangles; i++)
-        s->tri_object[i] = object;
 }
 
 static void constant(double u, double v, const void *with, double out[3])

@@ -10,19 +10,7 @@
 #include "tests/support/test.h"
 #include "tests/support/vectors.h"
 
-#define Z_LIMIT 4.89
-
 static const double DEGREE = M_PI / 180;
-
-static struct integrator_options paths(int depth, uint64_t seed)
-{
-    return (struct integrator_options){.kind = INTEGRATE_PATHS,
-                                       .direct = DIRECT_MIS,
-                                       .max_bounces = depth,
-                                       .light_samples = 1,
-                                       .roulette = ROULETTE_THROUGHPUT,
-                                       .sampler = {SAMPLER_INDEPENDENT, seed}};
-}
 
 static struct scene open_shipped(const char *name)
 {
@@ -195,14 +183,14 @@ TEST(mesh_lamp_direct_light_is_the_closed_form)
     mesh_lamp_image(SIZE, 8, -1, expected[0]);
     mesh_lamp_image(SIZE, 8, 7, expected[1]);
     struct scene s = open_shipped("36_mesh_lamp");
-    struct integrator_options io = paths(1, 20261136);
+    struct integrator_options io = check_options(DIRECT_MIS, 1, 20261136);
     io.first_bounce = 1;
     struct moments m = check_render(&s, io, SIZE, SIZE, 256);
     for (int side = SIZE; side >= TILE; side /= 4) {
         double z = worst_z(&m, expected[0], side, 0);
-        if (z > Z_LIMIT)
+        if (z > CHECK_Z_LIMIT)
             fail_msg("a square of %d pixels: z %.2f", side, z);
-        assert_true(worst_z(&m, expected[1], side, 0) > Z_LIMIT);
+        assert_true(worst_z(&m, expected[1], side, 0) > CHECK_Z_LIMIT);
     }
     moments_free(&m);
     scene_free(&s);
@@ -294,11 +282,11 @@ TEST(smooth_normals_in_sunlight_are_the_closed_form)
                 }
                 assert_true(fabs(sum) / (TILE * TILE) < slack / 2);
             }
-    struct moments m = check_render(&s, paths(1, 20261127), SIZE, SIZE, 1024);
+    struct moments m = check_render(&s, check_options(DIRECT_MIS, 1, 20261127), SIZE, SIZE, 1024);
     double z = worst_z(&m, fine, TILE, slack);
-    if (z > Z_LIMIT)
+    if (z > CHECK_Z_LIMIT)
         fail_msg("z %.2f", z);
-    assert_true(worst_z(&m, flat, TILE, slack) > Z_LIMIT);
+    assert_true(worst_z(&m, flat, TILE, slack) > CHECK_Z_LIMIT);
     moments_free(&m);
     scene_free(&s);
 }
@@ -368,17 +356,19 @@ TEST(mirror_wall_is_a_second_room)
     struct scene s = open_shipped("21_mirror");
     set_wall(&s, 1);
     struct scene two = unfolded(&s);
-    struct moments expected = check_render(&two, paths(DEPTH, 20261121), SIZE, SIZE, SPP);
-    struct moments m = check_render(&s, paths(DEPTH, 20261122), SIZE, SIZE, SPP);
+    struct moments expected =
+        check_render(&two, check_options(DIRECT_MIS, DEPTH, 20261121), SIZE, SIZE, SPP);
+    struct moments m =
+        check_render(&s, check_options(DIRECT_MIS, DEPTH, 20261122), SIZE, SIZE, SPP);
     for (int side = SIZE; side >= TILE; side /= 4) {
         double z = worst_difference(&m, &expected, side);
-        if (z > Z_LIMIT)
+        if (z > CHECK_Z_LIMIT)
             fail_msg("a square of %d pixels: z %.2f", side, z);
     }
     moments_free(&m);
     set_wall(&s, 0.95f);
-    m = check_render(&s, paths(DEPTH, 20261123), SIZE, SIZE, SPP);
-    assert_true(worst_difference(&m, &expected, SIZE) > Z_LIMIT);
+    m = check_render(&s, check_options(DIRECT_MIS, DEPTH, 20261123), SIZE, SIZE, SPP);
+    assert_true(worst_difference(&m, &expected, SIZE) > CHECK_Z_LIMIT);
     moments_free(&m);
     moments_free(&expected);
     scene_free(&two);
@@ -418,7 +408,7 @@ TEST(many_lamps_are_the_sum_of_single_ones)
     enum { SIZE = 16, SPP = 8192, EACH = 256 };
     struct scene all = open_shipped("45_many_lights");
     assert_int_equal(all.num_lights, 48);
-    struct integrator_options io = paths(3, 20261145);
+    struct integrator_options io = check_options(DIRECT_MIS, 3, 20261145);
     io.first_bounce = 1;
     struct moments whole = check_render(&all, io, SIZE, SIZE, SPP);
     double sum[3] = {0}, var[3] = {0}, weakest[3] = {INFINITY, INFINITY, INFINITY};
@@ -449,10 +439,10 @@ TEST(many_lamps_are_the_sum_of_single_ones)
     }
     for (int c = 0; c < 3; c++) {
         double se = sqrt(var[c] + mean_var[c]);
-        if (!(fabs(mean[c] - sum[c]) < Z_LIMIT * se))
+        if (!(fabs(mean[c] - sum[c]) < CHECK_Z_LIMIT * se))
             fail_msg("channel %d: %.6g, the sum is %.6g, standard error %.2g", c, mean[c], sum[c],
                      se);
-        assert_true(fabs(mean[c] - (sum[c] - weakest[c])) > Z_LIMIT * se);
+        assert_true(fabs(mean[c] - (sum[c] - weakest[c])) > CHECK_Z_LIMIT * se);
     }
     moments_free(&whole);
     scene_free(&all);

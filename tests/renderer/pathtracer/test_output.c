@@ -1,5 +1,6 @@
 /* What stands in the files that a render leaves, and what is said of it. Tone curves by hand: sRGB is 12.92 x up to 0.0031308, else
  * 1.055 x^(1/2.4) - 0.055, times 255, rounded; the assignment's (sqrt(2) x)^(1/2.2) times 255, cut off. */
+#define _GNU_SOURCE
 #include "renderer/image/image_oiio.h"
 #include "renderer/image/tone.h"
 #include "renderer/pathtracer/output.h"
@@ -24,7 +25,7 @@ TEST(tone_curves)
     }
 }
 
-/* Blue through green to red. */
+/* cs184: up to 1/2 blue to green, else green to red, linearly. */
 static const struct {
     int n; /* of 16 samples */
     uint8_t rgb8[3];
@@ -80,8 +81,7 @@ static const int code[2][3] = {{118, 188, 7}, {136, 217, 17}};
 static void fill(struct film *f, int from, int height)
 {
     struct err e = {0};
-    if (!film_alloc(f, WIDTH, height, false, &e))
-        fail_msg("%s", e.msg);
+    MUST(film_alloc(f, WIDTH, height, false, &e));
     f->num_samples = LAST - FIRST;
     for (int i = 0; i < WIDTH * height; i++) {
         int p = WIDTH * from + i;
@@ -93,34 +93,28 @@ static void fill(struct film *f, int from, int height)
     }
 }
 
-static void must(bool ok, const struct err *e)
-{
-    if (!ok)
-        fail_msg("%s", e->msg);
-}
-
-static void check_picture(const char *path, int height, bool cgl)
+static void check_pixels(const char *path, int height, const int *grey, bool rate)
 {
     struct err e = {0};
     struct image im;
-    must(image_read(path, &im, NULL, &e), &e);
+    MUST(image_read(path, &im, NULL, &e));
     assert_int_equal(im.width, WIDTH);
     assert_int_equal(im.height, height);
     for (int p = 0; p < WIDTH * height; p++)
         for (int c = 0; c < 3; c++)
-            assert_int_equal(lrintf(255 * im.data[p * im.channels + c]), code[cgl][(p + c) % 3]);
+            assert_int_equal(lrintf(255 * im.data[p * im.channels + c]),
+                             rate ? rates[4 - p % 4].rgb8[c] : grey[(p + c) % 3]);
     image_free(&im);
+}
+
+static void check_picture(const char *path, int height, bool cgl)
+{
+    check_pixels(path, height, code[cgl], false);
 }
 
 static void check_rates(const char *path, int height)
 {
-    struct err e = {0};
-    struct image im;
-    must(image_read(path, &im, NULL, &e), &e);
-    for (int p = 0; p < WIDTH * height; p++)
-        for (int c = 0; c < 3; c++)
-            assert_int_equal(lrintf(255 * im.data[p * im.channels + c]), rates[4 - p % 4].rgb8[c]);
-    image_free(&im);
+    check_pixels(path, height, NULL, true);
 }
 
 static void check_moments(const char *path, int height, const char *seconds)
@@ -128,7 +122,7 @@ static void check_moments(const char *path, int height, const char *seconds)
     struct err e = {0};
     struct image im;
     struct moments m;
-    must(moments_read(path, &m, &im, &e), &e);
+    MUST(moments_read(path, &m, &im, &e));
     assert_int_equal(m.width, WIDTH);
     assert_int_equal(m.height, height);
     for (int p = 0; p < WIDTH * height; p++) {
@@ -160,30 +154,25 @@ static void check_moments(const char *path, int height, const char *seconds)
     image_free(&im);
 }
 
+/* A tEXt chunk: name, 0, text. */
 static bool says(const char *path, const char *name, const char *text)
 {
-    size_t size = 0, length = strlen(name) + 1 + strlen(text); /* a tEXt chunk: name, 0, text */
+    size_t size, length = strlen(name) + 1 + strlen(text);
     struct image im;
     struct err e = {0};
-    must(image_read(path, &im, NULL, &e), &e);
+    MUST(image_read(path, &im, NULL, &e));
     image_free(&im);
     FILE *f = fopen(path, "rb");
     char bytes[4096], wanted[128];
     size = fread(bytes, 1, sizeof bytes, f);
     fclose(f);
-    memcpy(wanted, name, strlen(name) + 1);
-    memcpy(wanted + strlen(name) + 1, text, strlen(text));
-    for (size_t i = 0; i + length <= size; i++)
-        if (memcmp(bytes + i, wanted, length) == 0)
-            return true;
-    return false;
+    snprintf(wanted, sizeof wanted, "%s%c%s", name, 0, text);
+    return memmem(bytes, size, wanted, length) != NULL;
 }
 
 TEST(whole_images)
 {
-    char exr[256], png[256];
-    snprintf(exr, sizeof exr, "%s", test_path("a.exr"));
-    snprintf(png, sizeof png, "%s", test_path("a.png"));
+    const char *exr = test_path("a.exr"), *png = test_path("a.png");
     const struct render_stats stats = {.rays = {.rays = 7, .box_tests = 5, .primitive_tests = 3},
                                        .wall_seconds = 1.5,
                                        .cpu_seconds = 2.25};
@@ -192,7 +181,7 @@ TEST(whole_images)
     struct film f;
     set(&r, exr, png);
     fill(&f, 0, 2);
-    must(output_images(&r.out, &f, &stats, &e), &e);
+    MUST(output_images(&r.out, &f, &stats, &e));
     check_moments(exr, 2, "1.500 wall, 2.250 cpu");
     check_picture(png, 2, false);
     assert_true(says(png, "assay:samples", "4:20")); /* the most that a pixel has is 16 */
@@ -201,13 +190,13 @@ TEST(whole_images)
     assert_int_equal(access(test_path("a_rate.png"), F_OK), -1);
     film_free(&f);
     fill(&f, 0, 1); /* where the first alone has it */
-    must(output_images(&r.out, &f, &stats, &e), &e);
+    MUST(output_images(&r.out, &f, &stats, &e));
     assert_true(says(png, "assay:samples", "4:20"));
     film_free(&f);
     fill(&f, 0, 2);
     r.scene.dialect = DIALECT_CGL;
     r.opt.adaptive_batch = 4;
-    must(output_images(&r.out, &f, NULL, &e), &e);
+    MUST(output_images(&r.out, &f, NULL, &e));
     check_moments(exr, 2, NULL);
     check_picture(png, 2, true);
     check_rates(test_path("a_rate.png"), 2);
@@ -217,9 +206,7 @@ TEST(whole_images)
 /* Bands of 16 rows and 2: the second begins in the middle of everything. */
 TEST(images_in_bands)
 {
-    char exr[256], png[256];
-    snprintf(exr, sizeof exr, "%s", test_path("b.exr"));
-    snprintf(png, sizeof png, "%s", test_path("b.png"));
+    const char *exr = test_path("b.exr"), *png = test_path("b.png");
     struct err e = {0};
     struct render r;
     struct film band[2];
@@ -228,9 +215,9 @@ TEST(images_in_bands)
     fill(&band[0], 0, IMAGE_BAND);
     fill(&band[1], IMAGE_BAND, 2);
     struct output_writer *w = output_open(&r.out, WIDTH, IMAGE_BAND + 2, LAST - FIRST, NULL, &e);
-    must(w != NULL && output_rows(w, &band[0], &e) && output_rows(w, &band[1], &e), &e);
+    MUST(w != NULL && output_rows(w, &band[0], &e) && output_rows(w, &band[1], &e));
     assert_int_equal(access(png, F_OK), -1);
-    must(output_close(w, &e), &e);
+    MUST(output_close(w, &e));
     check_moments(exr, IMAGE_BAND + 2, NULL);
     check_picture(png, IMAGE_BAND + 2, false);
     check_rates(test_path("b_rate.png"), IMAGE_BAND + 2);
@@ -240,26 +227,26 @@ TEST(images_in_bands)
 
 TEST(names)
 {
-    char path[CHECKPOINT_PATH], folder[256];
+    char path[CHECKPOINT_PATH];
     struct err e = {0};
     struct render r;
     set(&r, "x.exr", NULL);
-    must(output_state_path(&r.out, NULL, path, &e), &e);
+    MUST(output_state_path(&r.out, NULL, path, &e));
     assert_string_equal(path, "x.exr.state");
-    must(output_state_path(&r.out, "y.png", path, &e), &e);
+    MUST(output_state_path(&r.out, "y.png", path, &e));
     assert_string_equal(path, "y.png.state");
     char longest[CHECKPOINT_PATH];
     memset(longest, 'a', sizeof longest);
     longest[CHECKPOINT_PATH - 1 - strlen(".state")] = '\0'; /* with the 0 behind it, just room */
-    must(output_state_path(&r.out, longest, path, &e), &e);
+    MUST(output_state_path(&r.out, longest, path, &e));
     longest[CHECKPOINT_PATH - 1 - strlen(".state")] = 'a';
     longest[CHECKPOINT_PATH - strlen(".state")] = '\0';
     assert_false(output_state_path(&r.out, longest, path, &e));
-    snprintf(folder, sizeof folder, "%s", test_path("none/x.png"));
+    const char *folder = test_path("none/x.png");
     set(&r, test_path("x.exr"), folder);
     assert_false(output_check(&r.out, &e));
     r.opt.num_outputs = 1;
-    must(output_check(&r.out, &e), &e);
+    MUST(output_check(&r.out, &e));
     r.opt.heatmap = folder;
     assert_false(output_check(&r.out, &e));
 }
@@ -294,7 +281,7 @@ TEST(summary_of_the_image)
     struct render r;
     struct film f;
     set(&r, "x.exr", NULL);
-    must(film_alloc(&f, WIDTH, 2, false, &e), &e);
+    MUST(film_alloc(&f, WIDTH, 2, false, &e));
     for (int p = 0; p < 6; p++) {
         f.m.n[p] = 4;
         for (int c = 0; c < 3; c++) {
@@ -331,7 +318,7 @@ TEST(what_is_said_of_a_render)
     struct film f;
     set(&r, "x.exr", "folder/y.png");
     r.opt.quiet = false;
-    must(film_alloc(&f, WIDTH, 2, false, &e), &e);
+    MUST(film_alloc(&f, WIDTH, 2, false, &e));
     for (int p = 0; p < 6; p++) {
         f.m.n[p] = 4;
         f.s1[p] = 8;
@@ -372,9 +359,8 @@ TEST(rescued_images)
     struct err e = {0};
     struct render r;
     struct film f;
-    char folder[600], tmp[600], words_said[1024], from[600];
-    snprintf(folder, sizeof folder, "%s", test_path("none/a.exr"));
-    snprintf(tmp, sizeof tmp, "%s", test_path("spare"));
+    char words_said[1024], from[600];
+    const char *folder = test_path("none/a.exr"), *tmp = test_path("spare");
     assert_int_equal(mkdir(tmp, 0700), 0);
     assert_non_null(getcwd(from, sizeof from));
     fill(&f, 0, 2);
@@ -415,19 +401,17 @@ TEST(rescued_images)
 /* A state and a rate map that cannot be are told before the render as images are. */
 TEST(what_cannot_be_written)
 {
-    char resumed[600], rate[600];
+    const char *resumed = test_path("c.exr.state"), *rate = test_path("d_rate.png");
     struct err e = {0};
     struct render r;
-    snprintf(resumed, sizeof resumed, "%s", test_path("c.exr.state"));
-    snprintf(rate, sizeof rate, "%s", test_path("d_rate.png"));
     set(&r, test_path("c.exr"), test_path("d.png"));
-    must(output_check(&r.out, &e), &e);
+    MUST(output_check(&r.out, &e));
     assert_int_equal(mkdir(rate, 0700), 0);
-    must(output_check(&r.out, &e), &e); /* not adaptive: no map */
+    MUST(output_check(&r.out, &e)); /* not adaptive: no map */
     r.opt.adaptive_batch = 4;
     assert_false(output_check(&r.out, &e));
     assert_int_equal(rmdir(rate), 0);
-    must(output_check(&r.out, &e), &e);
+    MUST(output_check(&r.out, &e));
     assert_int_equal(mkdir(resumed, 0700), 0);
     assert_false(output_check(&r.out, &e));
     assert_int_equal(rmdir(resumed), 0);

@@ -278,94 +278,12 @@ TEST(bad_texels_are_named)
     environment_free(sky_environment(&good));
 }
 
-static void put32(uint8_t **p, uint32_t v)
-{
-    for (int i = 0; i < 4; i++)
-        *(*p)++ = (uint8_t)(v >> 8 * i);
-}
-
-static void put_attribute(uint8_t **p, const char *name, const char *type, uint32_t size)
-{
-    *p = (uint8_t *)stpcpy((char *)*p, name) + 1;
-    *p = (uint8_t *)stpcpy((char *)*p, type) + 1;
-    put32(p, size);
-}
-
-/* An OpenEXR file of 2 x 1 half pixels, byte by byte: R 1 and 0.5, G 2 and 1, B 3 and 1.5. */
-static size_t half_exr(uint8_t *out)
-{
-    static const uint16_t rows[3][2] = {{0x4200, 0x3E00}, {0x4000, 0x3C00}, {0x3C00, 0x3800}};
-    static const char channels[3] = {'B', 'G', 'R'};
-    uint8_t *p = out;
-    put32(&p, 20000630);
-    put32(&p, 2);
-    put_attribute(&p, "channels", "chlist", 3 * 18 + 1);
-    for (int c = 0; c < 3; c++) {
-        *p++ = (uint8_t)channels[c];
-        *p++ = 0;
-        put32(&p, 1); /* half */
-        put32(&p, 0);
-        put32(&p, 1); /* sampling */
-        put32(&p, 1);
-    }
-    *p++ = 0;
-    put_attribute(&p, "compression", "compression", 1);
-    *p++ = 0;
-    static const char *const windows[] = {"dataWindow", "displayWindow"};
-    for (int k = 0; k < 2; k++) {
-        put_attribute(&p, windows[k], "box2i", 16);
-        put32(&p, 0);
-        put32(&p, 0);
-        put32(&p, 1);
-        put32(&p, 0);
-    }
-    put_attribute(&p, "lineOrder", "lineOrder", 1);
-    *p++ = 0;
-    put_attribute(&p, "pixelAspectRatio", "float", 4);
-    put32(&p, 0x3F800000);
-    put_attribute(&p, "screenWindowCenter", "v2f", 8);
-    put32(&p, 0);
-    put32(&p, 0);
-    put_attribute(&p, "screenWindowWidth", "float", 4);
-    put32(&p, 0x3F800000);
-    *p++ = 0;
-    put32(&p, (uint32_t)(p - out) + 8); /* offset of the only row */
-    put32(&p, 0);
-    put32(&p, 0);
-    put32(&p, 12);
-    for (int c = 0; c < 3; c++)
-        for (int i = 0; i < 2; i++) {
-            *p++ = (uint8_t)(rows[c][i] & 255);
-            *p++ = (uint8_t)(rows[c][i] >> 8);
-        }
-    return (size_t)(p - out);
-}
-
-/* The same image in RGBE: m 2^(e-136), so (64, 128, 192) with e = 130 is 1 2 3. */
-static size_t radiance_hdr(uint8_t *out)
-{
-    static const uint8_t pixels[8] = {64, 128, 192, 130, 32, 64, 96, 130};
-    uint8_t *p =
-        (uint8_t *)stpcpy((char *)out, "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n");
-    memcpy(p, pixels, sizeof pixels);
-    return (size_t)(p - out) + sizeof pixels;
-}
-
-static void write_bytes(const char *path, const void *bytes, size_t size)
-{
-    FILE *f = fopen(path, "wb");
-    assert_non_null(f);
-    assert_int_equal(fwrite(bytes, 1, size, f), size);
-    assert_int_equal(fclose(f), 0);
-}
-
 /* Column 0 of a map of 2 x 1 faces +Z, column 1 faces -Z. */
 static void check_two_texels(const char *path)
 {
     struct err e = {""};
     struct environment *env = environment_read(path, &e);
-    if (env == NULL)
-        fail_msg("%s", e.msg);
+    MUST(env != NULL);
     rgb front = environment_radiance(env, v3(0, 0, 1));
     rgb back = environment_radiance(env, v3(0, 0, -1));
     environment_free(env);
@@ -374,35 +292,20 @@ static void check_two_texels(const char *path)
     assert_true(fabsf(back.g - 1) < 1e-5f && fabsf(back.b - 1.5f) < 1e-5f);
 }
 
+/* RGBE: m 2^(e-136), so (64, 128, 192) with e = 130 is 1 2 3. Halves: tests/renderer/image/test_image.c. */
 TEST(files)
 {
-    char dir[] = "/tmp/assay-sky-XXXXXX", path[64];
-    uint8_t bytes[1024];
+    static const char hdr[] = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n"
+                              "\x40\x80\xc0\x82\x20\x40\x60\x82";
     struct err e = {""};
-    assert_non_null(mkdtemp(dir));
-
-    snprintf(path, sizeof path, "%s/half.exr", dir);
-    write_bytes(path, bytes, half_exr(bytes));
-    check_two_texels(path);
-    assert_int_equal(unlink(path), 0);
-
-    snprintf(path, sizeof path, "%s/light.hdr", dir);
-    write_bytes(path, bytes, radiance_hdr(bytes));
-    check_two_texels(path);
-    assert_int_equal(unlink(path), 0);
-
-    snprintf(path, sizeof path, "%s/float.exr", dir);
+    test_write(test_path("light.hdr"), hdr, sizeof hdr - 1);
+    check_two_texels(test_path("light.hdr"));
     const struct sky s = {.width = 2, .height = 1, .value = {1, 0.5f}};
     struct image im = sky_image(&s);
-    assert_true(image_write_exr(path, &im, &e));
+    MUST(image_write_exr(test_path("float.exr"), &im, &e));
     image_free(&im);
-    check_two_texels(path);
-    assert_int_equal(unlink(path), 0);
-
-    assert_null(environment_read(path, &e));
-    assert_non_null(strstr(e.msg, "float.exr: cannot read"));
-    snprintf(path, sizeof path, "%s/sky.png", dir);
-    assert_null(environment_read(path, &e));
-    assert_non_null(strstr(e.msg, "sky.png: an environment map must be an .exr or .hdr file"));
-    assert_int_equal(rmdir(dir), 0);
+    check_two_texels(test_path("float.exr"));
+    REFUSES(environment_read(test_path("none.exr"), &e) != NULL, "none.exr: cannot read");
+    REFUSES(environment_read(test_path("sky.png"), &e) != NULL,
+            "sky.png: an environment map must be an .exr or .hdr file");
 }

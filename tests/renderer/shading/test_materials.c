@@ -10,23 +10,6 @@
 
 static const double DEGREE = M_PI / 180;
 
-static const struct integrator_options path_options = {.kind = INTEGRATE_PATHS,
-                                                       .direct = DIRECT_MIS,
-                                                       .max_bounces = 1,
-                                                       .light_samples = 1,
-                                                       .roulette = ROULETTE_THROUGHPUT,
-                                                       .sampler = {SAMPLER_INDEPENDENT, 20260204}};
-
-/* Mean over the image and all samples of its pixels. */
-static struct check_result look(const struct scene *s, struct integrator_options io, int size,
-                                int spp)
-{
-    struct moments m = check_render(s, io, size, size, spp);
-    struct check_result r = check_pool(&m);
-    moments_free(&m);
-    return r;
-}
-
 /* A pinhole so narrow that the image is one direction: (0, sin, -cos) of the angle. */
 static void aim(struct scene *s, vec3 eye, double degrees)
 {
@@ -38,10 +21,7 @@ static void aim(struct scene *s, vec3 eye, double degrees)
 
 static struct integrator_options options(int direct, int depth)
 {
-    struct integrator_options io = path_options;
-    io.direct = (enum direct_kind)direct;
-    io.max_bounces = depth;
-    return io;
+    return check_options(direct, depth, 20260204);
 }
 
 static uint32_t smooth(struct scene *s, enum material_kind kind, rgb reflectance, rgb transmittance,
@@ -82,32 +62,31 @@ TEST(corridor_of_mirrors)
                 struct integrator_options io = options(direct, n);
                 io.first_bounce = n;
                 io.roulette = ROULETTE_OFF;
-                struct check_result r = look(&s, io, 4, 4);
+                struct check_result r = check_look(&s, io, 4, 4);
                 for (int c = 0; c < 3; c++) {
                     double expected = emitted;
                     for (int k = 0; k < n; k++)
                         expected *= k % 2 ? lower[c] : upper[c];
-                    check_result_mean(&r, c, expected, direct_kind_names[direct]);
+                    check_mean(&r, c, expected, direct_kind_names[direct]);
                     assert_true(r.std_error[c] < 1e-6);
                     /* Negative controls: the other half, and one mirror too many. */
-                    assert_false(
-                        check_result_agrees(&r, c, expected * (emitted > 2 ? 1.0 / 3 : 3)));
+                    assert_false(check_agrees(&r, c, expected * (emitted > 2 ? 1.0 / 3 : 3)));
                 }
-                assert_false(check_result_agrees(&r, 2, r.mean[2] * lower[2]));
+                assert_false(check_agrees(&r, 2, r.mean[2] * lower[2]));
                 /* With other depths there is nothing. */
                 io.max_bounces = io.first_bounce = n + 1;
-                assert_true(look(&s, io, 4, 4).mean[0] == 0);
+                assert_true(check_look(&s, io, 4, 4).mean[0] == 0);
                 if (n > 0) {
                     io = options(direct, n - 1);
-                    assert_true(look(&s, io, 4, 4).mean[0] == 0);
+                    assert_true(check_look(&s, io, 4, 4).mean[0] == 0);
                 }
                 /* Roulette: the same mean, with noise. */
                 io = options(direct, n + 2);
-                r = look(&s, io, 16, 64);
+                r = check_look(&s, io, 16, 64);
                 double expected = emitted;
                 for (int k = 0; k < n; k++)
                     expected *= k % 2 ? lower[1] : upper[1];
-                check_result_mean(&r, 1, expected, "roulette");
+                check_mean(&r, 1, expected, "roulette");
             }
             scene_free(&s);
         }
@@ -171,28 +150,28 @@ TEST(plate_of_glass)
             double inside = kind == 2 ? schlick(back, 1 / 1.5) : optics_fresnel(back, 1 / 1.5);
             for (size_t d = 0; d < sizeof depths / sizeof *depths; d++) {
                 struct integrator_options io = options((int)(a + d) % 4, depths[d]);
-                struct check_result got = look(&s, io, 16, 256);
+                struct check_result got = check_look(&s, io, 16, 256);
                 struct plate p[3];
                 for (int k = 0; k < 3; k++)
                     p[k] = plate(outside, inside, r[k], t[k], depths[d]);
-                check_result_mean(&got, 0, 3 * p[0].transmitted, "transmitted");
-                check_result_mean(&got, 1, 5 * p[1].reflected, "reflected");
-                check_result_mean(&got, 2, p[2].transmitted + p[2].reflected, "both");
+                check_mean(&got, 0, 3 * p[0].transmitted, "transmitted");
+                check_mean(&got, 1, 5 * p[1].reflected, "reflected");
+                check_mean(&got, 2, p[2].transmitted + p[2].reflected, "both");
                 if (depths[d] == 60 && kind == 0) {
                     double closed = (1 - outside) / (1 + outside);
                     assert_true(fabs(p[0].transmitted - closed) < 1e-9);
-                    check_result_mean(&got, 0, 3 * closed, "closed form");
+                    check_mean(&got, 0, 3 * closed, "closed form");
                     /* Negative control: one passage more, that is one face more. */
-                    assert_false(check_result_agrees(&got, 0, 3 * closed * (1 - outside)));
+                    assert_false(check_agrees(&got, 0, 3 * closed * (1 - outside)));
                 }
                 /* Negative controls at 80 degrees, where reflections inside count: one of them less;
                  * the other formula for R. */
                 if (angle[a] == 80 && depths[d] == 4 && kind != 2) {
                     struct plate less = plate(outside, inside, 1, 1, 2);
-                    assert_false(check_result_agrees(&got, 0, 3 * less.transmitted));
+                    assert_false(check_agrees(&got, 0, 3 * less.transmitted));
                     double other = schlick(c, 1.5);
                     assert_false(
-                        check_result_agrees(&got, 0, 3 * plate(other, other, 1, 1, 4).transmitted));
+                        check_agrees(&got, 0, 3 * plate(other, other, 1, 1, 4).transmitted));
                 }
             }
             scene_free(&s);
@@ -210,11 +189,11 @@ static struct scene furnace(void)
 static void check_furnace(const struct scene *s, double factor, const char *what, int depth)
 {
     for (int direct = 0; direct_kind_names[direct] != NULL; direct++) {
-        struct check_result r = look(s, options(direct, depth), 16, 64);
+        struct check_result r = check_look(s, options(direct, depth), 16, 64);
         for (int c = 0; c < 3; c++)
-            check_result_mean(&r, c, factor * (1 << c), what);
+            check_mean(&r, c, factor * (1 << c), what);
         /* Negative control. */
-        assert_false(check_result_agrees(&r, 0, factor * 1.01));
+        assert_false(check_agrees(&r, 0, factor * 1.01));
     }
 }
 
@@ -234,16 +213,16 @@ TEST(glass_ball_in_a_furnace)
                     build_sphere(&s, v3(0.1f, 0.2f, 0), 0.5f, -1, glass);
                 build_camera(&s, v3(0, 0, 2.5f), 40);
                 check_finish(&s);
-                struct check_result r = look(&s, options(DIRECT_MIS, 1000), 16, 64);
+                struct check_result r = check_look(&s, options(DIRECT_MIS, 1000), 16, 64);
                 for (int c = 0; c < 3; c++) {
-                    check_result_mean(&r, c, 1 << c, "ball");
+                    check_mean(&r, c, 1 << c, "ball");
                     /* A path that circles inside for 1000 bounces would be noise, and roulette,
                      * which must see through eta^2, would. */
                     assert_true(r.std_error[c] < 1e-6);
                 }
                 check_furnace(&s, 1, "ball", 1000);
                 /* Negative control: too few bounces lose light. */
-                r = look(&s, options(DIRECT_MIS, hollow ? 4 : 2), 16, 64);
+                r = check_look(&s, options(DIRECT_MIS, hollow ? 4 : 2), 16, 64);
                 assert_true(ior[i] == 1 || r.mean[0] < 1 - 1e-3);
                 scene_free(&s);
             }
@@ -299,12 +278,12 @@ TEST(refraction_alone)
             check_finish(&s);
             bool total = inside && sin(angle[a] * DEGREE) > 1 / 1.5;
             for (int direct = 0; direct_kind_names[direct] != NULL; direct++) {
-                struct check_result r = look(&s, options(direct, inside ? 1 : 2), 8, 16);
+                struct check_result r = check_look(&s, options(direct, inside ? 1 : 2), 8, 16);
                 double b = inside ? 2.25 * 0.8 : 0.64, red = inside ? 2.25 * 0.5 : 0.25;
-                check_result_mean(&r, 0, total ? 0 : 3 * red, "refraction");
-                check_result_mean(&r, 1, 0, "refraction");
-                check_result_mean(&r, 2, total ? 0 : b, "refraction");
-                assert_false(check_result_agrees(&r, 2, total ? b : b / 2.25));
+                check_mean(&r, 0, total ? 0 : 3 * red, "refraction");
+                check_mean(&r, 1, 0, "refraction");
+                check_mean(&r, 2, total ? 0 : b, "refraction");
+                assert_false(check_agrees(&r, 2, total ? b : b / 2.25));
             }
             scene_free(&s);
         }
@@ -360,12 +339,12 @@ TEST(rough_plate_in_a_furnace)
             /* Uniform directions and points of the furnace rarely meet a narrow lobe. */
             if (s.materials[m].alpha < 0.5f && direct < DIRECT_BSDF)
                 continue;
-            struct check_result r = look(&s, options(direct, 1), 16, 128);
+            struct check_result r = check_look(&s, options(direct, 1), 16, 128);
             for (int c = 0; c < 3; c++)
-                check_result_mean(&r, c, (1 << c) * albedo[c], direct_kind_names[direct]);
+                check_mean(&r, c, (1 << c) * albedo[c], direct_kind_names[direct]);
             /* Negative control. */
             if (direct >= DIRECT_BSDF)
-                assert_false(check_result_agrees(&r, 1, 2 * albedo[1] * 1.05));
+                assert_false(check_agrees(&r, 1, 2 * albedo[1] * 1.05));
         }
         scene_free(&s);
     }
@@ -401,14 +380,14 @@ TEST(plastic_plate_in_a_furnace)
         for (int direct = 0; direct_kind_names[direct] != NULL; direct++) {
             if (s.materials[m].alpha < 0.5f && direct < DIRECT_BSDF)
                 continue;
-            struct check_result r = look(&s, options(direct, 1), 16, 128);
+            struct check_result r = check_look(&s, options(direct, 1), 16, 128);
             for (int c = 0; c < 3; c++)
-                check_result_mean(&r, c, (1 << c) * (kd[c] + ks[c] * lobe + kr),
-                                  direct_kind_names[direct]);
+                check_mean(&r, c, (1 << c) * (kd[c] + ks[c] * lobe + kr),
+                           direct_kind_names[direct]);
             /* Negative controls: no highlight's loss, and the whole off by 5 %. */
             if (direct >= DIRECT_BSDF) {
-                assert_false(check_result_agrees(&r, 1, 2 * 1.05 * (kd[1] + ks[1] * lobe + kr)));
-                assert_true(lobe > 0.95 || !check_result_agrees(&r, 1, 2 * (kd[1] + ks[1] + kr)));
+                assert_false(check_agrees(&r, 1, 2 * 1.05 * (kd[1] + ks[1] * lobe + kr)));
+                assert_true(lobe > 0.95 || !check_agrees(&r, 1, 2 * (kd[1] + ks[1] + kr)));
             }
         }
         scene_free(&s);
@@ -488,15 +467,14 @@ TEST(lamp_in_a_rough_plate)
             other[c] = 4 * reflected_sphere(&metal, wo, centre, 0.4);
         }
         for (int direct = 0; direct_kind_names[direct] != NULL; direct++) {
-            struct check_result r = look(&s, options(direct, 1), 16, 512);
+            struct check_result r = check_look(&s, options(direct, 1), 16, 512);
             for (int c = 0; c < 3; c++) {
-                check_result_mean(&r, c, expected[c], direct_kind_names[direct]);
+                check_mean(&r, c, expected[c], direct_kind_names[direct]);
                 /* Negative controls: the other distribution; a roughness 15 % off, which alpha = .15
                  * does not show at this place. */
                 if (direct == DIRECT_MIS || direct == DIRECT_LIGHT) {
-                    assert_false(check_result_agrees(&r, c, other[c]));
-                    assert_true(s.materials[m].alpha < 0.5f ||
-                                !check_result_agrees(&r, c, rougher[c]));
+                    assert_false(check_agrees(&r, c, other[c]));
+                    assert_true(s.materials[m].alpha < 0.5f || !check_agrees(&r, c, rougher[c]));
                 }
             }
         }
@@ -524,13 +502,13 @@ TEST(lamp_in_a_plastic_plate)
         facets.alpha *= facets.alpha;
         const double squared = 4 * reflected_sphere(&facets, wo, centre, 0.4);
         for (int direct = 0; direct_kind_names[direct] != NULL; direct++) {
-            struct check_result r = look(&s, options(direct, 1), 16, 512);
+            struct check_result r = check_look(&s, options(direct, 1), 16, 512);
             for (int c = 0; c < 3; c++)
-                check_result_mean(&r, c, kd[c] * even + ks[c] * lobe, direct_kind_names[direct]);
+                check_mean(&r, c, kd[c] * even + ks[c] * lobe, direct_kind_names[direct]);
             /* Negative controls: alpha^2 for alpha, and a diffuse part without its highlight. */
             if (direct == DIRECT_MIS || direct == DIRECT_LIGHT) {
-                assert_false(check_result_agrees(&r, 1, kd[1] * even + ks[1] * squared));
-                assert_false(check_result_agrees(&r, 1, kd[1] * even));
+                assert_false(check_agrees(&r, 1, kd[1] * even + ks[1] * squared));
+                assert_false(check_agrees(&r, 1, kd[1] * even));
             }
         }
         scene_free(&s);

@@ -566,24 +566,6 @@ TEST(normals_as_colours)
     }
 }
 
-/* cs184: s <= 1/2 blue to green, else green to red, linearly. */
-TEST(rate_colours)
-{
-    static const struct {
-        double rate;
-        uint8_t rgb8[3];
-    } expected[] = {{0, {0, 0, 255}},
-                    {0.25, {0, 127, 127}},
-                    {0.5, {0, 255, 0}},
-                    {0.75, {127, 127, 0}},
-                    {1, {255, 0, 0}}};
-    for (size_t i = 0; i < sizeof expected / sizeof expected[0]; i++) {
-        uint8_t got[3];
-        rate_colour(expected[i].rate, got);
-        assert_memory_equal(got, expected[i].rgb8, 3);
-    }
-}
-
 /* Lightness by another formula than the one the map is made with: CIE L*, which Oklab's follows closely. */
 static double cie_lightness(const uint8_t rgb8[3])
 {

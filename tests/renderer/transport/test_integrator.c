@@ -5,14 +5,10 @@
 #include "tests/support/render_check.h"
 #include "tests/support/test.h"
 
-#define Z_LIMIT 4.89
-
-static const struct integrator_options path_options = {.kind = INTEGRATE_PATHS,
-                                                       .direct = DIRECT_MIS,
-                                                       .max_bounces = 1,
-                                                       .light_samples = 1,
-                                                       .roulette = ROULETTE_THROUGHPUT,
-                                                       .sampler = {SAMPLER_INDEPENDENT, 20260101}};
+static struct integrator_options paths(int direct, int depth)
+{
+    return check_options(direct, depth, 20260101);
+}
 
 /* A sphere seen from inside that reflects rho and emits E: L = E sum_{k=0..m} rho^k for every m,
  * because every point sees the same radiance in all directions. */
@@ -26,10 +22,8 @@ TEST(furnace_at_every_depth)
     check_finish(&s);
     for (int direct = 0; direct_kind_names[direct] != NULL; direct++)
         for (int depth = 0; depth <= 6; depth += depth < 2 ? 1 : 4) {
-            struct integrator_options io = path_options;
-            io.direct = (enum direct_kind)direct;
-            io.max_bounces = depth;
-            struct moments film = check_render(&s, io, 8, 8, 1024);
+            struct integrator_options io = paths(direct, depth);
+            struct check_result film = check_look(&s, io, 8, 1024);
             for (int c = 0; c < 3; c++) {
                 double sum = 0, term = emitted[c];
                 for (int k = 0; k <= depth; k++, term *= rho[c])
@@ -40,7 +34,6 @@ TEST(furnace_at_every_depth)
                 if (term > 1e-3 * sum && (direct != DIRECT_HEMISPHERE || depth < 2))
                     assert_false(check_agrees(&film, c, sum + term));
             }
-            moments_free(&film);
         }
     scene_free(&s);
 }
@@ -100,15 +93,13 @@ TEST(rectangle_light)
         double expected = 0.6 / M_PI * 5 * polygon_irradiance((const double(*)[3])corner, 4);
         for (int direct = 0; direct_kind_names[direct] != NULL; direct++)
             for (int l = 1; l <= 3; l += 2) {
-                struct integrator_options io = path_options;
-                io.direct = (enum direct_kind)direct;
+                struct integrator_options io = paths(direct, 1);
                 io.light_samples = l;
-                struct moments film = check_render(&s, io, 8, 8, 4096);
+                struct check_result film = check_look(&s, io, 8, 4096);
                 check_mean(&film, 1, expected, direct_kind_names[direct]);
                 /* Negative control: the assignment's pdf lacks 1/d, so its image is brighter by a
                  * mean distance of about 1.1 here; 5 % would already be rejected. */
                 assert_false(check_agrees(&film, 1, 1.05 * expected));
-                moments_free(&film);
             }
         scene_free(&s);
     }
@@ -128,12 +119,10 @@ TEST(sphere_light)
         double d2 = (double)dot(c, c), cos_theta = c.y / sqrt(d2);
         double expected = 0.5 / M_PI * (M_PI * 3 * 0.0625 / d2 * cos_theta);
         for (int direct = 0; direct_kind_names[direct] != NULL; direct++) {
-            struct integrator_options io = path_options;
-            io.direct = (enum direct_kind)direct;
-            struct moments film = check_render(&s, io, 8, 8, 4096);
+            struct integrator_options io = paths(direct, 1);
+            struct check_result film = check_look(&s, io, 8, 4096);
             check_mean(&film, 0, expected, direct_kind_names[direct]);
             assert_false(check_agrees(&film, 0, expected / cos_theta * 0.9));
-            moments_free(&film);
         }
         scene_free(&s);
     }
@@ -143,15 +132,11 @@ TEST(sphere_light)
 TEST(delta_lights)
 {
     struct scene s = floor_scene(0.7f);
-    build_light(&s, (struct light){.kind = LIGHT_POINT,
-                                   .value = {2, 3, 4},
-                                   .position = {0.6f, 0.8f, -0.5f},
-                                   .attenuation = {0, 0, 1}});
+    build_point(&s, v3(0.6f, 0.8f, -0.5f), (rgb){2, 3, 4});
     vec3 sun = normalize(v3(-1, 2, 0.5f));
-    build_light(&s,
-                (struct light){.kind = LIGHT_DIRECTIONAL, .value = {1, 0, 0.5f}, .to_light = sun});
+    build_sun(&s, sun, (rgb){1, 0, 0.5f});
     check_finish(&s);
-    struct moments film = check_render(&s, path_options, 4, 4, 64);
+    struct check_result film = check_look(&s, paths(DIRECT_MIS, 1), 4, 64);
     double d2 = 0.36 + 0.64 + 0.25, cos_point = 0.8 / sqrt(d2);
     double cos_sun = 2 / sqrt(1 + 4 + 0.25);
     const double intensity[3] = {2, 3, 4}, irradiance[3] = {1, 0, 0.5};
@@ -160,7 +145,6 @@ TEST(delta_lights)
         check_mean(&film, c, expected, "delta lights");
         assert_false(check_agrees(&film, c, expected * 1.001));
     }
-    moments_free(&film);
     scene_free(&s);
 }
 
@@ -172,14 +156,10 @@ TEST(shadow)
         uint32_t black = build_material(&s, grey(0), grey(0));
         build_quad(&s, v3(blocked ? -0.1f : 0.3f, 0.5f, -0.1f), v3(0.2f, 0, 0), v3(0, 0, 0.2f),
                    black);
-        build_light(&s, (struct light){.kind = LIGHT_POINT,
-                                       .value = {1, 1, 1},
-                                       .position = {0, 1, 0},
-                                       .attenuation = {0, 0, 1}});
+        build_point(&s, v3(0, 1, 0), grey(1));
         check_finish(&s);
-        struct moments film = check_render(&s, path_options, 4, 4, 16);
+        struct check_result film = check_look(&s, paths(DIRECT_MIS, 1), 4, 16);
         check_mean(&film, 0, blocked ? 0 : 0.7 / M_PI, "shadow");
-        moments_free(&film);
         scene_free(&s);
     }
 }
@@ -187,49 +167,10 @@ TEST(shadow)
 /* A box with two spheres and a lamp; enough of everything for the metamorphic tests. */
 static struct scene box_scene(float radiance)
 {
-    struct scene s = build_scene();
-    uint32_t white = build_material(&s, grey(0.6f), grey(0));
-    uint32_t red = build_material(&s, (rgb){0.6f, 0.2f, 0.2f}, grey(0));
-    uint32_t lamp = build_material(&s, grey(0), grey(radiance));
-    build_quad(&s, v3(-1, 0, 1), v3(2, 0, 0), v3(0, 0, -2), white);
-    build_quad(&s, v3(-1, 1.5f, -1), v3(2, 0, 0), v3(0, 0, 2), white);
-    build_quad(&s, v3(-1, 0, -1), v3(2, 0, 0), v3(0, 1.5f, 0), white);
-    build_quad(&s, v3(-1, 0, 1), v3(0, 0, -2), v3(0, 1.5f, 0), red);
-    build_quad(&s, v3(-0.3f, 1.49f, -0.4f), v3(0.6f, 0, 0), v3(0, 0, 0.8f), lamp);
-    build_sphere(&s, v3(0.4f, 0.3f, 0.3f), 0.3f, 1, white);
-    build_sphere(&s, v3(-0.4f, 0.3f, -0.3f), 0.3f, 1, red);
-    build_camera(&s, v3(0, 0.75f, 3), 49);
+    struct scene s = build_room(radiance);
+    build_sphere(&s, v3(-0.4f, 0.3f, -0.3f), 0.3f, 1, 1);
     check_finish(&s);
     return s;
-}
-
-static bool same_bits(const struct moments *a, const struct moments *b)
-{
-    size_t n = (size_t)a->width * (size_t)a->height;
-    return memcmp(a->n, b->n, n * sizeof *a->n) == 0 &&
-           memcmp(a->mean, b->mean, 3 * n * sizeof *a->mean) == 0 &&
-           memcmp(a->m2, b->m2, 3 * n * sizeof *a->m2) == 0 &&
-           memcmp(a->m3, b->m3, 3 * n * sizeof *a->m3) == 0;
-}
-
-TEST(same_bits_for_any_threads)
-{
-    struct scene s = box_scene(10);
-    struct integrator_options io = path_options;
-    io.max_bounces = 5;
-    struct moments one = check_render(&s, io, 50, 38, 8);
-    for (int threads = 2; threads <= 7; threads += 5) {
-        struct moments many = check_render_with(&s, io, 50, 38, 8, threads, BVH_SAH);
-        assert_true(same_bits(&one, &many));
-        moments_free(&many);
-    }
-    /* Negative control: another seed is another image. */
-    io.sampler.seed++;
-    struct moments other = check_render(&s, io, 50, 38, 8);
-    assert_false(same_bits(&one, &other));
-    moments_free(&other);
-    moments_free(&one);
-    scene_free(&s);
 }
 
 /* A cell, and a range of samples, are the same numbers as in the whole image. */
@@ -238,31 +179,27 @@ TEST(cells_and_sample_ranges_add_up)
     struct err e = {0};
     struct scene s = box_scene(10);
     struct camera c;
-    struct render_stats stats;
-    struct progress p;
-    progress_start(&p, "test", NULL, true);
-    assert_true(camera_init(&c, &s, 40, 30, &e));
-    struct bvh *bvh = bvh_build(&s, BVH_SAH, &e);
-    struct integrator_options io = path_options;
-    io.max_bounces = 3;
-    struct render_options o = {
-        .integrator = io, .width = 40, .height = 30, .num_samples = 6, .threads = 2};
-    struct moments whole, cell, first, rest;
-    assert_true(render(&s, &c, bvh, &o, &p, &whole, &stats, &e));
+    MUST(camera_init(&c, &s, 40, 30, &e));
+    struct render_options o = {.integrator = paths(DIRECT_MIS, 3),
+                               .width = 40,
+                               .height = 30,
+                               .num_samples = 6,
+                               .threads = 2};
+    struct moments whole = check_render_all(&s, &c, &o, BVH_SAH, NULL);
     o.num_samples = 2;
-    assert_true(render(&s, &c, bvh, &o, &p, &first, &stats, &e));
+    struct moments first = check_render_all(&s, &c, &o, BVH_SAH, NULL);
     o.first_sample = 2;
     o.num_samples = 4;
-    assert_true(render(&s, &c, bvh, &o, &p, &rest, &stats, &e));
-    assert_true(moments_merge(&first, &rest, &e));
-    o = (struct render_options){.integrator = io,
+    struct moments rest = check_render_all(&s, &c, &o, BVH_SAH, NULL);
+    MUST(moments_merge(&first, &rest, &e));
+    o = (struct render_options){.integrator = o.integrator,
                                 .x = 7,
                                 .y = 11,
                                 .width = 21,
                                 .height = 13,
                                 .num_samples = 6,
                                 .threads = 1};
-    assert_true(render(&s, &c, bvh, &o, &p, &cell, &stats, &e));
+    struct moments cell = check_render_all(&s, &c, &o, BVH_SAH, NULL);
     for (int y = 0; y < 13; y++)
         assert_memory_equal(cell.mean + 3 * (size_t)y * 21,
                             whole.mean + 3 * ((size_t)(y + 11) * 40 + 7), 21 * 3 * sizeof(double));
@@ -270,7 +207,6 @@ TEST(cells_and_sample_ranges_add_up)
         assert_true(fabs(first.mean[i] - whole.mean[i]) <= 1e-12 * (1 + fabs(whole.mean[i])));
         assert_true(fabs(first.m2[i] - whole.m2[i]) <= 1e-10 * (1 + fabs(whole.m2[i])));
     }
-    bvh_free(bvh);
     moments_free(&whole);
     moments_free(&cell);
     moments_free(&first);
@@ -284,9 +220,7 @@ TEST(bounces_add_up)
 {
     struct scene s = box_scene(10);
     for (int direct = 0; direct_kind_names[direct] != NULL; direct++) {
-        struct integrator_options io = path_options;
-        io.direct = (enum direct_kind)direct;
-        io.max_bounces = 4;
+        struct integrator_options io = paths(direct, 4);
         struct moments all = check_render(&s, io, 16, 12, 16);
         double sum[16 * 12 * 3] = {0};
         for (int k = 0; k <= 4; k++) {
@@ -305,8 +239,7 @@ TEST(bounces_add_up)
 
 TEST(twice_the_light_twice_the_image)
 {
-    struct integrator_options io = path_options;
-    io.max_bounces = 4;
+    struct integrator_options io = paths(DIRECT_MIS, 4);
     struct scene one = box_scene(5), two = box_scene(10);
     struct moments a = check_render(&one, io, 16, 12, 16);
     struct moments b = check_render(&two, io, 16, 12, 16);
@@ -323,26 +256,25 @@ TEST(twice_the_light_twice_the_image)
 TEST(estimators_agree)
 {
     struct scene s = box_scene(10);
-    struct integrator_options io = path_options;
-    io.max_bounces = 4;
+    struct integrator_options io = paths(DIRECT_MIS, 4);
     io.roulette = ROULETTE_OFF;
-    struct moments reference = check_render_with(&s, io, 64, 48, 64, 2, BVH_SAH);
+    struct moments reference = check_render(&s, io, 64, 48, 64);
     for (int direct = 0; direct_kind_names[direct] != NULL; direct++)
         for (int roulette = ROULETTE_OFF; roulette <= ROULETTE_FIXED; roulette++) {
             io.sampler.seed++;
             io.direct = (enum direct_kind)direct;
             io.roulette = (enum roulette_kind)roulette;
             io.survival = 0.7f;
-            struct moments film = check_render_with(&s, io, 64, 48, 64, 2, BVH_SAH);
+            struct moments film = check_render(&s, io, 64, 48, 64);
             double z = check_z(&film, &reference, 0);
-            if (fabs(z) > Z_LIMIT)
+            if (fabs(z) > CHECK_Z_LIMIT)
                 fail_msg("%s, roulette %d: z = %.2f", direct_kind_names[direct], roulette, z);
             moments_free(&film);
         }
     /* Negative control: one bounce less. */
     io.max_bounces = 3;
-    struct moments shallow = check_render_with(&s, io, 64, 48, 256, 2, BVH_SAH);
-    assert_true(fabs(check_z(&shallow, &reference, 0)) > Z_LIMIT);
+    struct moments shallow = check_render(&s, io, 64, 48, 256);
+    assert_true(fabs(check_z(&shallow, &reference, 0)) > CHECK_Z_LIMIT);
     moments_free(&shallow);
     moments_free(&reference);
     scene_free(&s);

@@ -7,16 +7,7 @@
 #include "tests/support/render_check.h"
 #include "tests/support/test.h"
 
-#define Z_LIMIT 4.89
-
 enum { WIDTH = 24, HEIGHT = 18, SPP = 1024, NUM_VALUES = 3 * WIDTH * HEIGHT };
-
-static const struct integrator_options options = {.kind = INTEGRATE_PATHS,
-                                                  .direct = DIRECT_MIS,
-                                                  .max_bounces = 4,
-                                                  .light_samples = 1,
-                                                  .roulette = ROULETTE_THROUGHPUT,
-                                                  .sampler = {SAMPLER_INDEPENDENT, 20260301}};
 
 enum lamps { AREA = 1, POINT = 2, SPOT = 4, ALL = 7 };
 
@@ -65,28 +56,19 @@ static struct scene build(const struct variant *v)
         build_quad(&s, v3(-.5f, 1.6f, -.5f), v3(1, 0, 0), v3(0, 0, 1), lamp);
     }
     if (v->lamps & POINT)
-        build_light(&s, (struct light){.kind = LIGHT_POINT,
-                                       .value = permuted(v, .5f, .7f, .9f),
-                                       .position = v3(.8f, 1.2f, .7f),
-                                       .attenuation = {0, 0, 1}});
+        build_point(&s, v3(.8f, 1.2f, .7f), permuted(v, .5f, .7f, .9f));
     if (v->lamps & SPOT)
-        build_light(&s, (struct light){.kind = LIGHT_SPOT,
-                                       .value = permuted(v, 2, 1, .5f),
-                                       .position = v3(-.8f, 1.3f, .6f),
-                                       .axis = normalize(v3(.5f, -1, -.4f)),
-                                       .cos_cutoff = .5f,
-                                       .exponent = 3,
-                                       .attenuation = {0, 0, 1}});
+        build_spot(&s, v3(-.8f, 1.3f, .6f), normalize(v3(.5f, -1, -.4f)), .5f, 3,
+                   permuted(v, 2, 1, .5f));
     build_camera(&s, v3(0, .8f, 3), 45);
     return s;
 }
 
 static struct moments look(struct scene *s, uint64_t seed)
 {
-    struct integrator_options io = options;
-    io.sampler.seed += seed;
     check_finish(s);
-    struct moments m = check_render(s, io, WIDTH, HEIGHT, SPP);
+    struct moments m =
+        check_render(s, check_options(DIRECT_MIS, 4, 20260301 + seed), WIDTH, HEIGHT, SPP);
     scene_free(s);
     return m;
 }
@@ -193,7 +175,7 @@ TEST(rigid_motion_and_scale)
             if (mirrored)
                 flip(&m);
             double z = worst_z(&still, &m);
-            if (z > Z_LIMIT)
+            if (z > CHECK_Z_LIMIT)
                 fail_msg("size %g, mirrored %d: z = %.2f", (double)sizes[i], mirrored, z);
             moments_free(&m);
         }
@@ -203,12 +185,12 @@ TEST(rigid_motion_and_scale)
     for (uint32_t i = 0; i < s.num_lights; i++)
         s.lights[i].value = rgb_scale(s.lights[i].value, 1 / 1.44f);
     struct moments m = look(&s, 11);
-    assert_true(worst_z(&still, &m) > Z_LIMIT);
+    assert_true(worst_z(&still, &m) > CHECK_Z_LIMIT);
     moments_free(&m);
     s = build(&original);
     s.lights[0].position.x -= 0.3f;
     m = look(&s, 12);
-    assert_true(worst_z(&still, &m) > Z_LIMIT);
+    assert_true(worst_z(&still, &m) > CHECK_Z_LIMIT);
     moments_free(&m);
     moments_free(&still);
 }
@@ -258,9 +240,9 @@ TEST(lights_add)
             sum.m2[i] += m.m2[i];
         }
         if (k == 2)
-            assert_true(worst_z(&all, &sum) <= Z_LIMIT);
+            assert_true(worst_z(&all, &sum) <= CHECK_Z_LIMIT);
         else /* negative control: the spot light is missing */
-            assert_true(worst_z(&all, &sum) > Z_LIMIT);
+            assert_true(worst_z(&all, &sum) > CHECK_Z_LIMIT);
         moments_free(&m);
     }
     moments_free(&sum);

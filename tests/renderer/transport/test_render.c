@@ -1,26 +1,13 @@
 /* Whole images: the samplers agree, threads change nothing, and the counts are right. */
-#include "renderer/transport/render.h"
-#include "tests/support/build_scene.h"
+#include "tests/support/render_check.h"
 #include "tests/support/test.h"
 
 enum { WIDTH = 40, HEIGHT = 30 };
 
-/* Half a room with a lamp, a red wall and a ball. */
 static struct scene room(void)
 {
-    struct scene s = build_scene();
-    uint32_t white = build_material(&s, grey(0.6f), grey(0));
-    uint32_t red = build_material(&s, (rgb){0.6f, 0.2f, 0.2f}, grey(0));
-    uint32_t lamp = build_material(&s, grey(0), grey(10));
-    build_quad(&s, v3(-1, 0, 1), v3(2, 0, 0), v3(0, 0, -2), white);
-    build_quad(&s, v3(-1, 1.5f, -1), v3(2, 0, 0), v3(0, 0, 2), white);
-    build_quad(&s, v3(-1, 0, -1), v3(2, 0, 0), v3(0, 1.5f, 0), white);
-    build_quad(&s, v3(-1, 0, 1), v3(0, 0, -2), v3(0, 1.5f, 0), red);
-    build_quad(&s, v3(-0.3f, 1.49f, -0.4f), v3(0.6f, 0, 0), v3(0, 0, 0.8f), lamp);
-    build_sphere(&s, v3(0.4f, 0.3f, 0.3f), 0.3f, 1, white);
-    build_camera(&s, v3(0, 0.75f, 3), 49);
-    struct err e = {0};
-    MUST(scene_finish(&s, "test", &e));
+    struct scene s = build_room(10);
+    check_finish(&s);
     return s;
 }
 
@@ -34,32 +21,23 @@ static struct moments image(const struct scene *s, struct how how, struct render
 {
     struct err e = {0};
     struct camera c;
-    struct moments m;
-    struct progress p;
-    progress_start(&p, "test", NULL, true);
-    assert_true(camera_init(&c, s, WIDTH, HEIGHT, &e));
-    struct bvh *bvh = bvh_build(s, how.accel, &e);
-    assert_non_null(bvh);
-    struct render_options o = {.integrator = {.kind = INTEGRATE_PATHS,
-                                              .direct = DIRECT_MIS,
-                                              .max_bounces = how.bounces,
-                                              .light_samples = 1,
-                                              .roulette = ROULETTE_THROUGHPUT,
-                                              .sampler = how.sampler},
+    MUST(camera_init(&c, s, WIDTH, HEIGHT, &e));
+    struct render_options o = {.integrator = check_options(DIRECT_MIS, how.bounces, 0),
                                .width = WIDTH,
                                .height = HEIGHT,
                                .num_samples = (uint32_t)how.spp,
                                .threads = how.threads};
-    MUST(render(s, &c, bvh, &o, &p, &m, stats, &e));
-    bvh_free(bvh);
-    return m;
+    o.integrator.sampler = how.sampler;
+    return check_render_all(s, &c, &o, how.accel, stats);
 }
 
 static bool same_bits(const struct moments *a, const struct moments *b)
 {
     size_t n = (size_t)a->width * (size_t)a->height;
-    return memcmp(a->mean, b->mean, 3 * n * sizeof *a->mean) == 0 &&
-           memcmp(a->m2, b->m2, 3 * n * sizeof *a->m2) == 0;
+    return memcmp(a->n, b->n, n * sizeof *a->n) == 0 &&
+           memcmp(a->mean, b->mean, 3 * n * sizeof *a->mean) == 0 &&
+           memcmp(a->m2, b->m2, 3 * n * sizeof *a->m2) == 0 &&
+           memcmp(a->m3, b->m3, 3 * n * sizeof *a->m3) == 0;
 }
 
 /* The same image, and the same rays and tests counted, by 1, 2 and 7 threads: every ray is traced
@@ -122,9 +100,8 @@ static void replicates(const struct scene *s, struct how how, int count, double 
     double m2 = 0;
     *mean = 0;
     for (int k = 0; k < count; k++) {
-        struct render_stats stats;
         how.sampler.seed++;
-        struct moments m = image(s, how, &stats);
+        struct moments m = image(s, how, NULL);
         double sum = 0;
         for (size_t i = 0; i < WIDTH * HEIGHT * 3; i++)
             sum += m.mean[i] / (WIDTH * HEIGHT * 3);
@@ -161,10 +138,9 @@ TEST(samplers_agree)
 /* Sum over pixels of the variance between two images with different seeds. */
 static double noise(const struct scene *s, struct how how)
 {
-    struct render_stats stats;
-    struct moments a = image(s, how, &stats);
+    struct moments a = image(s, how, NULL);
     how.sampler.seed += 50;
-    struct moments b = image(s, how, &stats);
+    struct moments b = image(s, how, NULL);
     double sum = 0;
     for (size_t i = 0; i < WIDTH * HEIGHT * 3; i++)
         sum += (a.mean[i] - b.mean[i]) * (a.mean[i] - b.mean[i]) / 2;
@@ -189,13 +165,12 @@ TEST(sobol_has_less_noise)
     print_message("noise of Sobol over independent: %.3f\n", sobol / independent);
     assert_true(sobol < independent / 2);
     assert_true(again > independent / 2 && again < independent * 2);
-    struct render_stats stats;
-    struct moments m = image(&s, how, &stats);
+    struct moments m = image(&s, how, NULL);
     assert_string_equal(m.unit, "stratified");
     assert_true(isnan(moments_var_of_mean(&m, 0, 0)));
     moments_free(&m);
     how.sampler.kind = SAMPLER_INDEPENDENT;
-    m = image(&s, how, &stats);
+    m = image(&s, how, NULL);
     assert_string_equal(m.unit, "sample");
     assert_false(isnan(moments_var_of_mean(&m, 0, 0)));
     moments_free(&m);

@@ -1,9 +1,8 @@
 /* The stages on eight paths at a time: each sample has the bits that they give it one at a time, with
  * every set of instructions that this machine has. */
-#include "renderer/transport/render.h"
 #include "renderer/scene/cs184_deviations.h"
 #include "renderer/math/trig.h"
-#include "tests/support/build_scene.h"
+#include "tests/support/render_check.h"
 #include "tests/support/sky.h"
 #include "tests/support/test.h"
 
@@ -18,15 +17,6 @@ static void add_room(struct scene *s, uint32_t wall)
     build_quad(s, v3(-1, 1.5f, -1), v3(2, 0, 0), v3(0, 0, 2), wall);
     build_quad(s, v3(-1, 0, -1), v3(2, 0, 0), v3(0, 1.5f, 0), red);
     build_quad(s, v3(-1, 0, 1), v3(0, 0, -2), v3(0, 1.5f, 0), black);
-}
-
-static uint32_t material_like(struct scene *s, struct material like)
-{
-    uint32_t m = build_material(s, like.reflectance, grey(0));
-    struct material *to = &s->materials[m];
-    memcpy(like.name, to->name, sizeof like.name);
-    *to = like;
-    return m;
 }
 
 /* Every material and every kind of light, each light above another part of the room. */
@@ -68,7 +58,7 @@ static struct scene all_kinds(void)
     };
     add_room(&s, build_material(&s, grey(0.7f), grey(0)));
     for (int i = 0; i < 8; i++) {
-        uint32_t m = material_like(&s, kinds[i]);
+        uint32_t m = build_like(&s, kinds[i]);
         float x = -0.75f + 0.2f * (float)i, z = 0.3f - 0.3f * (float)(i % 3);
         if (i % 2 == 0)
             build_sphere(&s, v3(x, 0.25f + 0.1f * (float)(i % 4), z), 0.15f, 1, m);
@@ -84,16 +74,8 @@ static struct scene all_kinds(void)
                                    .position = {0.7f, 1.2f, 0.5f},
                                    .value = {0.5f, 0.4f, 0.3f},
                                    .attenuation = {0.1f, 0.2f, 1}});
-    build_light(&s, (struct light){.kind = LIGHT_SPOT,
-                                   .position = {0, 1.3f, 0.8f},
-                                   .axis = {0, -0.8f, -0.6f},
-                                   .cos_cutoff = 0.7f,
-                                   .exponent = 2.5f,
-                                   .value = {2, 1, 1},
-                                   .attenuation = {0, 0, 1}});
-    build_light(&s, (struct light){.kind = LIGHT_DIRECTIONAL,
-                                   .to_light = {0.6f, 0.64f, 0.48f},
-                                   .value = {0.2f, 0.2f, 0.3f}});
+    build_spot(&s, v3(0, 1.3f, 0.8f), v3(0, -0.8f, -0.6f), 0.7f, 2.5f, (rgb){2, 1, 1});
+    build_sun(&s, v3(0.6f, 0.64f, 0.48f), (rgb){0.2f, 0.2f, 0.3f});
     return s;
 }
 
@@ -120,10 +102,7 @@ static struct scene mesh_lamp(void)
     for (int i = 0; i < 6; i++)
         build_quad(&s, v3(0.1f * (float)i, 0.2f * (float)i, 0), v3(0.2f, 0.1f, 0),
                    v3(0, 0.2f, 0.1f), lamp);
-    for (uint32_t i = 0; i < s.num_triangles; i++)
-        s.tri_object[i] = 0;
-    s.objects[0].num_triangles = s.num_triangles;
-    s.num_objects = 1;
+    build_join(&s, 0);
     build_sphere(&s, v3(0, 0, 0), 4, -1, build_material(&s, grey(0.5f), grey(0)));
     return s;
 }
@@ -148,15 +127,12 @@ static struct scene textured(void)
         uint32_t lamp = build_material(&s, grey(0.4f), (rgb){4, 5, 6});
         s.materials[lamp].radiance_map = 3 + (uint32_t)i;
         s.materials[lamp].radiance_both_sides = i == 1;
-        uint32_t first = s.num_triangles;
+        uint32_t first = s.num_triangles, object = s.num_objects;
         for (int k = 0; k <= i; k++)
             build_quad(&s, v3(-0.8f + 0.25f * (float)i, 0.4f + 0.1f * (float)k, -0.5f),
                        v3(0.2f, 0, 0), v3(0, 0.1f, 0.05f), lamp);
         build_uv(&s, first, 1 + (float)i, (struct uv){0.2f, -0.1f});
-        for (uint32_t t = first; t < s.num_triangles; t++)
-            s.tri_object[t] = s.num_objects - 1 - (uint32_t)i;
-        s.num_objects -= (uint32_t)i;
-        s.objects[s.num_objects - 1].num_triangles = s.num_triangles - first;
+        build_join(&s, object);
     }
     return s;
 }
@@ -172,25 +148,17 @@ static struct moments image_of(const struct scene *s, const struct how *how)
 {
     struct err e = {0};
     struct camera c;
-    struct moments m;
-    struct progress p;
-    struct render_stats stats;
-    progress_start(&p, "test", NULL, true);
     int width = how->width > 0 ? how->width : WIDTH,
         height = how->height > 0 ? how->height : HEIGHT;
     assert_true(camera_init(&c, s, width, height, &e));
     c.lens_radius = how->lens;
     c.focal_distance = 3;
-    struct bvh *bvh = bvh_build(s, BVH_WIDE, &e);
-    assert_non_null(bvh);
     struct render_options o = {.integrator = how->opt,
                                .width = width,
                                .height = height,
                                .num_samples = (uint32_t)how->spp,
                                .threads = how->threads};
-    MUST(render(s, &c, bvh, &o, &p, &m, &stats, &e));
-    bvh_free(bvh);
-    return m;
+    return check_render_all(s, &c, &o, BVH_WIDE, NULL);
 }
 
 /* 0 and -0 may differ. */
