@@ -106,7 +106,9 @@ void expect_any_resolution(const char *name)
 void expect_refusal(const char *kind, const char *text, int depth, const char *message)
 {
     json_error_t why;
-    json_t *values = json_loads(text, 0, &why);
+    char *json = test_json(text);
+    json_t *values = json_loads(json, 0, &why);
+    free(json);
     assert_non_null(values);
     struct suite_scene scene = {.name = "19_bad",
                                 .width = 4,

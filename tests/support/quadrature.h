@@ -37,7 +37,7 @@ void expect_box_filter(const struct plane_scene *p, const int (*pixels)[2], size
  * pixels tile the footprint. */
 void expect_any_resolution(const char *name);
 
-/* Renders the closed form `kind` at 4 x 4 pixels from `values` (JSON text) as scene 19_bad, lens of
+/* Renders the closed form `kind` at 4 x 4 pixels from `values` (JSON by test_json()) as scene 19_bad, lens of
  * radius .25 focused at 2. Passes if it is refused with a line that names the scene and holds
  * `message`, or if message is NULL and it is accepted. */
 void expect_refusal(const char *kind, const char *values, int depth, const char *message);

@@ -75,6 +75,27 @@ void test_write(const char *path, const void *bytes, size_t size)
     assert_int_equal(fclose(f), 0);
 }
 
+void test_write_text(const char *path, const char *text)
+{
+    test_write(path, text, strlen(text));
+}
+
+char *test_json(const char *text)
+{
+    char *json = strdup(text);
+    assert_non_null(json);
+    for (char *at = json; (at = strchr(at, '\'')) != NULL;)
+        *at = '"';
+    return json;
+}
+
+void test_write_json(const char *path, const char *json)
+{
+    char *text = test_json(json);
+    test_write_text(path, text);
+    free(text);
+}
+
 static bool is_number(const char *at)
 {
     return isdigit((unsigned char)at[strspn(at, "-.")]);

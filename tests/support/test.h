@@ -31,6 +31,14 @@ void test_add_group(CMFixtureFunction set_up, CMFixtureFunction tear_down);
         test_add(#name, name, set_up, tear_down);                                                  \
     }                                                                                              \
     static void name(__attribute__((unused)) void **state)
+/* The same for a `struct fixture`, which is `f` in the test. */
+#define TEST_OF(fixture, name, set_up, tear_down)                                                  \
+    static void name##_of(struct fixture *f);                                                      \
+    TEST_WITH(name, set_up, tear_down)                                                             \
+    {                                                                                              \
+        name##_of(*state);                                                                         \
+    }                                                                                              \
+    static void name##_of(struct fixture *f)
 /* Once before all tests of the file, and once after them. */
 #define TEST_GROUP(set_up, tear_down)                                                              \
     static __attribute__((constructor)) void group_add(void)                                       \
@@ -46,6 +54,11 @@ const char *test_path(const char *name);
 /* The whole file with a 0 behind it; the caller frees. Writes one of those bytes. */
 char *test_read(const char *path);
 void test_write(const char *path, const void *bytes, size_t size);
+/* Writes a text; one of JSON may have ' for ", which makes it legible in C. */
+void test_write_text(const char *path, const char *text);
+void test_write_json(const char *path, const char *json);
+/* The text with " for each '; the caller frees. */
+char *test_json(const char *text);
 
 /* Path of one of the assignment's files, which are not ours to ship (ASSAY_CS184 says where they are); else it skips the test, and
  * says so. */

@@ -6,12 +6,6 @@
 
 #include <gsl/gsl_cdf.h>
 
-void probe_ok(bool ok, const struct err *e)
-{
-    if (!ok)
-        fail_msg("%s", e->msg);
-}
-
 int probe_setup(void **state)
 {
     struct probe *f = calloc(1, sizeof *f);
@@ -20,7 +14,7 @@ int probe_setup(void **state)
     assert_non_null(mkdtemp(f->dir));
     snprintf(f->work, sizeof f->work, "%s/work", f->dir);
     snprintf(f->bin, sizeof f->bin, "%s/bin", f->dir);
-    probe_ok(fs_make_dirs(f->work, &e) && fs_make_dirs(f->bin, &e), &e);
+    MUST(fs_make_dirs(f->work, &e) && fs_make_dirs(f->bin, &e));
     snprintf(f->path, sizeof f->path, "%s", getenv("PATH"));
     f->s = build_scene();
     f->suite = (struct suite_scene){.name = "test", .width = 4, .height = 4, .depth = 1};
@@ -50,9 +44,8 @@ int probe_teardown(void **state)
 void probe_finish(struct probe *f)
 {
     struct err e;
-    probe_ok(scene_finish(&f->s, "test", &e) &&
-                 camera_init(&f->c, &f->s, f->suite.width, f->suite.height, &e),
-             &e);
+    MUST(scene_finish(&f->s, "test", &e) &&
+         camera_init(&f->c, &f->s, f->suite.width, f->suite.height, &e));
 }
 
 void probe_size(struct probe *f, int width, int height)
@@ -138,7 +131,7 @@ void probe_run(struct probe *f, int spp, struct moments *m)
     f->ref.spp = spp;
     bool ok = engine_driver_render(&cycles_driver, &f->job, m, manifest, &e);
     json_decref(manifest);
-    probe_ok(ok, &e);
+    MUST(ok);
 }
 
 void probe_render(struct probe *f, struct moments *m)

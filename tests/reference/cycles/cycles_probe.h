@@ -22,9 +22,7 @@ struct probe {
 /* cmocka's setup and teardown; *state is the probe: 3 replicates of 4 x 4 pixels, depth 1. */
 int probe_setup(void **state);
 int probe_teardown(void **state);
-
-/* Fails the test with the line of *e. */
-void probe_ok(bool ok, const struct err *e);
+#define PROBE(name) TEST_OF(probe, name, probe_setup, probe_teardown)
 
 /* For a test of Blender itself: sets the size of the image, or skips the test, and says so, where there is no Blender. */
 void probe_size(struct probe *f, int width, int height);

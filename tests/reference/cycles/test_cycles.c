@@ -39,11 +39,11 @@ static void write_replicate(struct probe *f, int k, int width, float value, floa
     struct image im;
     struct err e;
     snprintf(path, sizeof path, "%s/replicate_%04d.exr", f->work, k);
-    probe_ok(image_alloc(&im, width, 4, 3, names, &e), &e);
+    MUST(image_alloc(&im, width, 4, 3, names, &e));
     for (int i = 0; i < width * 4 * 3; i++)
         im.data[i] = value;
     im.data[0] = first;
-    probe_ok(image_write_exr(path, &im, &e), &e);
+    MUST(image_write_exr(path, &im, &e));
     image_free(&im);
 }
 
@@ -60,9 +60,8 @@ static void assert_fails(struct probe *f, const char *why)
     json_decref(manifest);
 }
 
-TEST_WITH(replicates_are_folded_and_described, probe_setup, probe_teardown)
+PROBE(replicates_are_folded_and_described)
 {
-    struct probe *f = *state;
     struct err e;
     struct moments m;
     json_t *manifest = json_object();
@@ -70,7 +69,7 @@ TEST_WITH(replicates_are_folded_and_described, probe_setup, probe_teardown)
     for (int k = 0; k < 3; k++)
         write_replicate(f, k, 4, (float)(k * k), 9);
     stand_in(f, "echo \"$@\" > args; " OK);
-    probe_ok(engine_driver_render(&cycles_driver, &f->job, &m, manifest, &e), &e);
+    MUST(engine_driver_render(&cycles_driver, &f->job, &m, manifest, &e));
     assert_string_equal(m.unit, "replicate");
     assert_true(m.spp == 16);
     /* 0, 1, 4: mean 5/3, M2 = 26/3 by hand. */
@@ -97,9 +96,8 @@ TEST_WITH(replicates_are_folded_and_described, probe_setup, probe_teardown)
 }
 
 /* All pixels of all replicates alike: no random number had any effect. */
-TEST_WITH(light_without_noise_is_exact, probe_setup, probe_teardown)
+PROBE(light_without_noise_is_exact)
 {
-    struct probe *f = *state;
     struct err e;
     struct moments m;
     json_t *manifest = json_object();
@@ -107,7 +105,7 @@ TEST_WITH(light_without_noise_is_exact, probe_setup, probe_teardown)
     for (int k = 0; k < 3; k++)
         write_replicate(f, k, 4, .25f, .25f);
     stand_in(f, OK);
-    probe_ok(engine_driver_render(&cycles_driver, &f->job, &m, manifest, &e), &e);
+    MUST(engine_driver_render(&cycles_driver, &f->job, &m, manifest, &e));
     assert_string_equal(m.unit, "exact");
     for (int p = 0; p < 16; p++)
         assert_true(m.n[p] == 1 && m.mean[3 * p] == .25 && m.m2[3 * p] == 0);
@@ -115,9 +113,8 @@ TEST_WITH(light_without_noise_is_exact, probe_setup, probe_teardown)
     moments_free(&m);
 }
 
-TEST_WITH(equal_replicates_are_refused, probe_setup, probe_teardown)
+PROBE(equal_replicates_are_refused)
 {
-    struct probe *f = *state;
     plain_scene(f);
     write_replicate(f, 0, 4, 1, 2);
     write_replicate(f, 1, 4, 1, 3);
@@ -140,13 +137,12 @@ static void write_noise(struct probe *f, int k, size_t own, uint64_t *random, st
         im->data[i] = 1 + (float)(*random >> 40) * 0x1p-24f;
     }
     snprintf(path, sizeof path, "%s/replicate_%04d.exr", f->work, k);
-    probe_ok(image_write_exr(path, im, &e), &e);
+    MUST(image_write_exr(path, im, &e));
 }
 
 /* Different images all, but two were made with the same random numbers up to the last row. */
-TEST_WITH(replicates_that_share_their_noise_are_refused, probe_setup, probe_teardown)
+PROBE(replicates_that_share_their_noise_are_refused)
 {
-    struct probe *f = *state;
     static const char *const names[] = {"R", "G", "B"};
     struct image im;
     struct moments m;
@@ -157,11 +153,11 @@ TEST_WITH(replicates_that_share_their_noise_are_refused, probe_setup, probe_tear
     f->ref.replicates = 4;
     plain_scene(f);
     stand_in(f, OK);
-    probe_ok(image_alloc(&im, 16, 16, 3, names, &e), &e);
+    MUST(image_alloc(&im, 16, 16, 3, names, &e));
     for (int k = 0; k < 4; k++)
         write_noise(f, k, 256, &random, &im);
-    probe_ok(engine_driver_render(&cycles_driver, &f->job, &m, manifest, &e),
-             &e); /* these are independent */
+    MUST(engine_driver_render(&cycles_driver, &f->job, &m, manifest,
+                              &e)); /* these are independent */
     const json_t *test = json_object_get(manifest, "independence");
     assert_true(json_is_true(json_object_get(test, "tested")));
     assert_true(json_is_true(json_object_get(test, "passed")));
@@ -173,9 +169,8 @@ TEST_WITH(replicates_that_share_their_noise_are_refused, probe_setup, probe_tear
     image_free(&im);
 }
 
-TEST_WITH(unusable_images_are_refused, probe_setup, probe_teardown)
+PROBE(unusable_images_are_refused)
 {
-    struct probe *f = *state;
     plain_scene(f);
     stand_in(f, OK);
     assert_fails(f, "/replicate_0000.exr");
@@ -188,9 +183,8 @@ TEST_WITH(unusable_images_are_refused, probe_setup, probe_teardown)
     assert_fails(f, "replicate_0001.exr: pixel 0,0 is negative or not finite");
 }
 
-TEST_WITH(a_blender_that_fails_is_quoted, probe_setup, probe_teardown)
+PROBE(a_blender_that_fails_is_quoted)
 {
-    struct probe *f = *state;
     plain_scene(f);
     for (int k = 0; k < 3; k++)
         write_replicate(f, k, 4, (float)k, 9);
@@ -207,9 +201,8 @@ TEST_WITH(a_blender_that_fails_is_quoted, probe_setup, probe_teardown)
     assert_fails(f, "blender: no end after 1 s");
 }
 
-TEST_WITH(what_is_missing_is_named, probe_setup, probe_teardown)
+PROBE(what_is_missing_is_named)
 {
-    struct probe *f = *state;
     plain_scene(f);
     setenv("PATH", f->bin, 1);
     assert_fails(f, "blender: no such program in PATH");
@@ -237,9 +230,8 @@ static void point_light_radiance(const double d[3], double out[3], const void *d
         out[c] = albedo[c] / M_PI * intensity[c] * .8 / (r2 * sqrt(r2));
 }
 
-TEST_WITH(point_light_on_a_wall, probe_setup, probe_teardown)
+PROBE(point_light_on_a_wall)
 {
-    struct probe *f = *state;
     probe_size(f, 24, 16);
     build_quad(&f->s, v3(-5, -5, -2), v3(10, 0, 0), v3(0, 10, 0),
                build_material(&f->s, (rgb){.5f, .25f, .8f}, grey(0)));
@@ -276,9 +268,8 @@ static void standing_emitter_radiance(const double d[3], double out[3], const vo
         out[c] = p[0] < .5 ? albedo[c] / M_PI * 10 * fabs(sum) / 2 : 0;
 }
 
-TEST_WITH(emitter_that_stands_on_the_wall, probe_setup, probe_teardown)
+PROBE(emitter_that_stands_on_the_wall)
 {
-    struct probe *f = *state;
     probe_size(f, 24, 16);
     build_quad(&f->s, v3(-1, -1, -2), v3(2, 0, 0), v3(0, 2, 0),
                build_material(&f->s, (rgb){.5f, .25f, .8f}, grey(0)));
@@ -302,9 +293,8 @@ static void furnace_radiance(const double d[3], double out[3], const void *data)
         out[c] = (c + 1) * (1 - pow(albedo[c], 4)) / (1 - albedo[c]);
 }
 
-TEST_WITH(furnace_inside_a_sphere, probe_setup, probe_teardown)
+PROBE(furnace_inside_a_sphere)
 {
-    struct probe *f = *state;
     probe_size(f, 24, 16);
     f->suite.depth = 3;
     build_sphere(&f->s, v3(.1f, .2f, .3f), 1.5f, -1,
@@ -317,9 +307,8 @@ TEST_WITH(furnace_inside_a_sphere, probe_setup, probe_teardown)
 /* Depth 0, half of the view an emitter's front and half an emitter's back, which also reflects. The
  * line between them, x = .015, runs through the middle column of pixels, which spans -.0462 .. .0462
  * at that distance, so that two thirds of it are the front. */
-TEST_WITH(only_fronts_emit, probe_setup, probe_teardown)
+PROBE(only_fronts_emit)
 {
-    struct probe *f = *state;
     struct moments m;
     probe_size(f, 25, 40);
     f->suite.depth = 0;
@@ -342,9 +331,8 @@ TEST_WITH(only_fronts_emit, probe_setup, probe_teardown)
 /* The front alone, to x = .015, which is .1623 of a pixel right of the middle column's centre: under a Gauss of .8 pixels column x
  * sees Phi((.1623 + 12 - x)/.8) of it, by 8 x 40 x 64 samples, whose standard error is .0035 at most. Had Blender's width
  * another meaning, such as the whole support of 12 sigmas, column 13 would see .001 and not .148. */
-TEST_WITH(a_gauss_is_a_quarter_of_its_width, probe_setup, probe_teardown)
+PROBE(a_gauss_is_a_quarter_of_its_width)
 {
-    struct probe *f = *state;
     struct moments m;
     struct err e = {""};
     probe_size(f, 25, 40);
@@ -353,7 +341,7 @@ TEST_WITH(a_gauss_is_a_quarter_of_its_width, probe_setup, probe_teardown)
                build_material(&f->s, grey(.5f), grey(1)));
     build_camera(&f->s, v3(0, 0, 0), 60);
     probe_finish(f);
-    probe_ok(pixel_filter_parse("gauss:0.8:4.8", &f->c.filter, &e), &e);
+    MUST(pixel_filter_parse("gauss:0.8:4.8", &f->c.filter, &e));
     probe_run(f, 64, &m);
     double edge = .015 * 25 / (4 * tan(M_PI / 6));
     for (int x = 0; x < 25; x++) {

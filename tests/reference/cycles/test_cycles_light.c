@@ -42,13 +42,13 @@ static void check_lamp(struct probe *f, bool spot)
     probe_check(f, tan(M_PI / 6), 64, lamp_radiance, &spot, 3e-4, false);
 }
 
-TEST_WITH(falloff_with_all_three_terms, probe_setup, probe_teardown)
+PROBE(falloff_with_all_three_terms)
 {
-    check_lamp(*state, false);
+    check_lamp(f, false);
 }
-TEST_WITH(spot_with_a_hard_edge, probe_setup, probe_teardown)
+PROBE(spot_with_a_hard_edge)
 {
-    check_lamp(*state, true);
+    check_lamp(f, true);
 }
 
 /* Looks straight up, with +X to the right and +Z up in the image: the pole in its middle. */
@@ -59,9 +59,8 @@ static void zenith_radiance(const double d[3], double out[3], const void *data)
         out[k] = (k + 1) * sky_seen(data, w);
 }
 
-TEST_WITH(sky_around_the_pole, probe_setup, probe_teardown)
+PROBE(sky_around_the_pole)
 {
-    struct probe *f = *state;
     struct sky sky = sky_uneven(16, 8);
     probe_size(f, 24, 16);
     for (int i = 0; i < 16; i++) /* beside the pole nothing is constant, nor equal across it */
@@ -77,9 +76,8 @@ TEST_WITH(sky_around_the_pole, probe_setup, probe_teardown)
 }
 
 /* The wall in a sky with a hot texel: radiance = albedo / pi x irradiance, by quadrature. */
-TEST_WITH(irradiance_of_a_sky, probe_setup, probe_teardown)
+PROBE(irradiance_of_a_sky)
 {
-    struct probe *f = *state;
     const struct sky sky = sky_uneven(16, 8);
     probe_size(f, 24, 16);
     build_wall(f, 5);
@@ -100,9 +98,8 @@ static void ambient_radiance(const double d[3], double out[3], const void *data)
         out[k] = 2 * d[0] < .5 && 2 * d[1] < .4 ? ALBEDO[k] * ambient[k] / 2 : 0;
 }
 
-TEST_WITH(ambient_light_on_rough_surfaces_alone, probe_setup, probe_teardown)
+PROBE(ambient_light_on_rough_surfaces_alone)
 {
-    struct probe *f = *state;
     struct err e;
     probe_size(f, 24, 16);
     f->suite.depth = 3;
@@ -133,9 +130,8 @@ static void lens_radiance(const double d[3], double out[3], const void *data)
         out[k] = (k + 1) * (.5 + (asin(h) + h * sqrt(1 - h * h)) / M_PI);
 }
 
-TEST_WITH(lens_on_an_edge, probe_setup, probe_teardown)
+PROBE(lens_on_an_edge)
 {
-    struct probe *f = *state;
     struct moments m;
     probe_size(f, 24, 16);
     build_quad(&f->s, v3(.2f, -9, -3), v3(9, 0, 0), v3(0, 18, 0),

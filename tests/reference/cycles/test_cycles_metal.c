@@ -108,29 +108,29 @@ static void check_ball(struct probe *f, struct metal is, struct metal is_not, do
     probe_judge(f, &m, probe_expect(f, tan(M_PI / 6), 32, ball_radiance, &a), allowed, true);
 }
 
-TEST_WITH(closure_in_white, probe_setup, probe_teardown)
+PROBE(closure_in_white)
 {
-    check_ball(*state, (struct metal){true, true, false, .5, 0, 0},
+    check_ball(f, (struct metal){true, true, false, .5, 0, 0},
                (struct metal){true, false, false, .5, 0, 0}, 3e-4);
 }
-TEST_WITH(ggx_facets_in_white, probe_setup, probe_teardown)
+PROBE(ggx_facets_in_white)
 {
-    check_ball(*state, (struct metal){true, false, true, .5, 0, 0},
+    check_ball(f, (struct metal){true, false, true, .5, 0, 0},
                (struct metal){true, true, true, .5, 0, 0}, 3e-4);
 }
-TEST_WITH(beckmann_facets_in_white, probe_setup, probe_teardown)
+PROBE(beckmann_facets_in_white)
 {
-    check_ball(*state, (struct metal){false, false, true, .4, 0, 0},
+    check_ball(f, (struct metal){false, false, true, .4, 0, 0},
                (struct metal){true, false, true, .4, 0, 0}, 3e-4);
 }
-TEST_WITH(plastic_in_white, probe_setup, probe_teardown)
+PROBE(plastic_in_white)
 {
-    check_ball(*state, (struct metal){false, true, false, .6, .4, .1},
+    check_ball(f, (struct metal){false, true, false, .6, .4, .1},
                (struct metal){false, false, false, .6, .3, .1}, 3e-4);
 }
-TEST_WITH(rough_beckmann_facets_in_white, probe_setup, probe_teardown)
+PROBE(rough_beckmann_facets_in_white)
 {
-    check_ball(*state, (struct metal){false, true, false, 1.1, 0, 0},
+    check_ball(f, (struct metal){false, true, false, 1.1, 0, 0},
                (struct metal){false, true, false, 1.2, 0, 0}, 3e-4);
 }
 
@@ -180,15 +180,15 @@ static void check_lobe(struct probe *f, struct metal is)
     probe_judge(f, &m, probe_expect(f, 1, 1, probe_uniform, want), 5e-4, true);
 }
 
-TEST_WITH(closure_in_a_sky, probe_setup, probe_teardown)
+PROBE(closure_in_a_sky)
 {
-    check_lobe(*state, (struct metal){true, true, false, .3, 0, 0});
+    check_lobe(f, (struct metal){true, true, false, .3, 0, 0});
 }
-TEST_WITH(ggx_facets_in_a_sky, probe_setup, probe_teardown)
+PROBE(ggx_facets_in_a_sky)
 {
-    check_lobe(*state, (struct metal){true, false, true, .3, 0, 0});
+    check_lobe(f, (struct metal){true, false, true, .3, 0, 0});
 }
-TEST_WITH(beckmann_facets_in_a_sky, probe_setup, probe_teardown)
+PROBE(beckmann_facets_in_a_sky)
 {
-    check_lobe(*state, (struct metal){false, true, true, .3, 0, 0});
+    check_lobe(f, (struct metal){false, true, true, .3, 0, 0});
 }

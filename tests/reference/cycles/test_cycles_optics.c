@@ -69,9 +69,8 @@ static void mirror_ball_radiance(const double d[3], double out[3], const void *d
         out[c] = l * (c + 1) * (hit ? REFLECTANCE[c] : 1);
 }
 
-TEST_WITH(mirror_ball_in_a_sky, probe_setup, probe_teardown)
+PROBE(mirror_ball_in_a_sky)
 {
-    struct probe *f = *state;
     const struct sky sky = sky_uneven(16, 8);
     probe_size(f, 48, 32);
     build_sphere(&f->s, v3((float)BALL[0], (float)BALL[1], (float)BALL[2]), (float)BALL_RADIUS, 1,
@@ -92,9 +91,8 @@ static void glowing_mirror_radiance(const double d[3], double out[3], const void
         out[c] = (c + 1) * (1 - pow(albedo[c], depth + 1)) / (1 - albedo[c]);
 }
 
-TEST_WITH(mirrors_count_as_bounces, probe_setup, probe_teardown)
+PROBE(mirrors_count_as_bounces)
 {
-    struct probe *f = *state;
     struct moments m;
     probe_size(f, 24, 16);
     f->suite.depth = 3;
@@ -174,13 +172,13 @@ static void check_slab(struct probe *f, bool schlick)
     probe_judge(f, &m, probe_expect(f, tan(M_PI / 3), 8, slab_radiance, &is), 1e-4, true);
 }
 
-TEST_WITH(slab_of_glass, probe_setup, probe_teardown)
+PROBE(slab_of_glass)
 {
-    check_slab(*state, false);
+    check_slab(f, false);
 }
-TEST_WITH(slab_by_schlick, probe_setup, probe_teardown)
+PROBE(slab_by_schlick)
 {
-    check_slab(*state, true);
+    check_slab(f, true);
 }
 
 /* One plane boundary in a sky, which is seen through it and mirrored by it: radiance from behind is
@@ -219,27 +217,25 @@ static void check_boundary(struct probe *f, struct boundary b, bool front)
     probe_check(f, tan(M_PI / 3), 32, boundary_radiance, &b, 4e-4, false);
 }
 
-TEST_WITH(eye_before_glowing_glass, probe_setup, probe_teardown)
+PROBE(eye_before_glowing_glass)
 {
-    check_boundary(*state, (struct boundary){.ior = 1.5, .glass = true, .glow = {.5, .25, 1}},
-                   true);
+    check_boundary(f, (struct boundary){.ior = 1.5, .glass = true, .glow = {.5, .25, 1}}, true);
 }
-TEST_WITH(eye_in_glass, probe_setup, probe_teardown)
+PROBE(eye_in_glass)
 {
-    check_boundary(*state, (struct boundary){.ior = 1 / 1.5, .glass = true}, false);
+    check_boundary(f, (struct boundary){.ior = 1 / 1.5, .glass = true}, false);
 }
-TEST_WITH(eye_in_glass_by_schlick, probe_setup, probe_teardown)
+PROBE(eye_in_glass_by_schlick)
 {
-    check_boundary(*state, (struct boundary){.ior = 1 / 1.5, .glass = true, .schlick = true},
-                   false);
+    check_boundary(f, (struct boundary){.ior = 1 / 1.5, .glass = true, .schlick = true}, false);
 }
-TEST_WITH(refraction_alone, probe_setup, probe_teardown)
+PROBE(refraction_alone)
 {
-    check_boundary(*state, (struct boundary){.ior = 1.5}, true);
+    check_boundary(f, (struct boundary){.ior = 1.5}, true);
 }
-TEST_WITH(refraction_alone_from_behind, probe_setup, probe_teardown)
+PROBE(refraction_alone_from_behind)
 {
-    check_boundary(*state, (struct boundary){.ior = 1 / 1.5}, false);
+    check_boundary(f, (struct boundary){.ior = 1 / 1.5}, false);
 }
 
 enum { BALL_DEPTH = 5 };
@@ -285,9 +281,8 @@ static void glass_ball_radiance(const double d[3], double out[3], const void *da
     }
 }
 
-TEST_WITH(glass_ball_in_a_sky, probe_setup, probe_teardown)
+PROBE(glass_ball_in_a_sky)
 {
-    struct probe *f = *state;
     const struct sky sky = sky_uneven(16, 8);
     probe_size(f, 48, 32);
     f->suite.depth = BALL_DEPTH;
@@ -312,9 +307,8 @@ static void tilted_mirror_radiance(const double d[3], double out[3], const void 
         out[k] = REFLECTANCE[k] * l * (k + 1);
 }
 
-TEST_WITH(mirror_with_tilted_normals, probe_setup, probe_teardown)
+PROBE(mirror_with_tilted_normals)
 {
-    struct probe *f = *state;
     const struct sky sky = sky_uneven(16, 8);
     probe_size(f, 48, 32);
     build_quad(&f->s, v3(-40, -40, -2), v3(80, 0, 0), v3(0, 80, 0),

@@ -76,6 +76,8 @@ static int teardown(void **state)
     return 0;
 }
 
+#define EXPORT(name) TEST_OF(fixture, name, setup, teardown)
+
 /* The dump, with a line for each member; the caller frees. */
 static char *dump(struct fixture *f, int depth)
 {
@@ -117,9 +119,8 @@ static void assert_refused(struct fixture *f, int depth, const char *why)
 
 /* With shading normals: the floor's second triangle is smooth, and the lamp's are all
  * on the wrong side, from where the renderer turns them. */
-TEST_WITH(the_dump_is_the_scene, setup, teardown)
+EXPORT(the_dump_is_the_scene)
 {
-    struct fixture *f = *state;
     strcpy(f->s.materials[0].name, "fl\303\266or\"");
     for (int k = 0; k < 3; k++) {
         f->s.normal[3 + k] = v3(.6f, .8f, 0);
@@ -148,9 +149,8 @@ static void set_environment(struct fixture *f, struct environment *env)
 
 /* Only what the Glossy BSDF is (GGX, separable, one colour for all angles) may meet lights that no ray
  * runs into. */
-TEST_WITH(microfacets, setup, teardown)
+EXPORT(microfacets)
 {
-    struct fixture *f = *state;
     struct err e;
     struct material *m = &f->s.materials[0];
     m->kind = MATERIAL_MICROFACET;
@@ -184,9 +184,8 @@ TEST_WITH(microfacets, setup, teardown)
 }
 
 /* Diffuse and a sharp mirror may meet every light, facets of a highlight only what rays run into. */
-TEST_WITH(plastic, setup, teardown)
+EXPORT(plastic)
 {
-    struct fixture *f = *state;
     struct material *m = &f->s.materials[0];
     m->kind = MATERIAL_PLASTIC;
     m->reflectance = (rgb){.5f, .25f, 0};
@@ -202,9 +201,8 @@ TEST_WITH(plastic, setup, teardown)
         f, "\"distribution\":\"beckmann\",\n\"alpha\":0.25,\n\"separable\":true,\n\"facets\":true");
 }
 
-TEST_WITH(ambient_light, setup, teardown)
+EXPORT(ambient_light)
 {
-    struct fixture *f = *state;
     struct err e;
     put_out_delta_lights(f);
     set_environment(f, environment_upper_half((rgb){1, 2, 4}, &e));
@@ -215,9 +213,8 @@ TEST_WITH(ambient_light, setup, teardown)
 }
 
 /* The map goes beside the dump, to the bit, and nothing of it stays if the dump fails. */
-TEST_WITH(a_sky, setup, teardown)
+EXPORT(a_sky)
 {
-    struct fixture *f = *state;
     struct err e;
     struct image got;
     const struct sky sky = sky_uneven(8, 4);
@@ -243,9 +240,8 @@ TEST_WITH(a_sky, setup, teardown)
     assert_int_equal(rmdir(f->path), 0);
 }
 
-TEST_WITH(a_lens, setup, teardown)
+EXPORT(a_lens)
 {
-    struct fixture *f = *state;
     f->c.lens_radius = .25f;
     f->c.focal_distance = 0;
     assert_refused(f, 1, "a lens that focuses at distance 0");
@@ -257,9 +253,8 @@ TEST_WITH(a_lens, setup, teardown)
     assert_refused(f, 1, "the far plane is at 6.6");
 }
 
-TEST_WITH(cameras_that_cycles_lacks_are_refused, setup, teardown)
+EXPORT(cameras_that_cycles_lacks_are_refused)
 {
-    struct fixture *f = *state;
     const struct camera c = f->c;
     f->c.tan_v *= 1.01f;
     assert_refused(f, 1, "pixels are not square");
@@ -285,9 +280,8 @@ TEST_WITH(cameras_that_cycles_lacks_are_refused, setup, teardown)
 
 /* A border makes the image one texel larger in that direction alone, and all of what is left is black; coordinates are those of the
  * corners, in the triangles' order. */
-TEST_WITH(textures_are_images_beside_the_dump, setup, teardown)
+EXPORT(textures_are_images_beside_the_dump)
 {
-    struct fixture *f = *state;
     const rgb texels[2] = {{.1f, .2f, 3}, {.4f, .5f, .6f}};
     struct image im;
     struct err e = {""};
@@ -323,9 +317,8 @@ TEST_WITH(textures_are_images_beside_the_dump, setup, teardown)
 
 /* Squares at depths 1, 4 and 9, with sides of 1, 2 and 2: distances 1 to 1.22, 4 to 4.24, 9 to 9.11. A plane between two
  * by distance is put half way between them by depth; one that cuts through the first is refused. */
-TEST_WITH(planes_between_whole_surfaces_clip_by_depth, setup, teardown)
+EXPORT(planes_between_whole_surfaces_clip_by_depth)
 {
-    struct fixture *f = *state;
     scene_free(&f->s);
     f->s = build_scene();
     uint32_t grey_material = build_material(&f->s, grey(.5f), grey(0));
@@ -348,9 +341,8 @@ TEST_WITH(planes_between_whole_surfaces_clip_by_depth, setup, teardown)
     assert_refused(f, 1, "the near plane is at 1.1");
 }
 
-TEST_WITH(depth_is_limited_and_files_appear_whole, setup, teardown)
+EXPORT(depth_is_limited_and_files_appear_whole)
 {
-    struct fixture *f = *state;
     assert_refused(f, 1026, "Cycles: depth 1026, at most 1025 are possible");
     free(dump(f, 1025));
     free((char *)(uintptr_t)f->path);

@@ -28,7 +28,7 @@ static int set_up(void **state)
 
 static bool load(const char *json, struct engine *en, struct err *e)
 {
-    test_write(test_path("engine.json"), json, strlen(json));
+    test_write_json(test_path("engine.json"), json);
     return engine_load(test_path("engine.json"), en, e);
 }
 
@@ -71,14 +71,23 @@ static float not_a_number(int pixel, int k)
 static void engine_of_script(const char *script, const char *more, struct engine *en)
 {
     char json[2048];
-    snprintf(
-        json, sizeof json,
-        "{\"name\": \"fake\", \"format\": \"pbrt\", \"image\": \"pfm\", \"expresses\": "
-        "[\"diffuse\", \"point\"], \"replicates\": %d, \"spp\": 7, \"command\": [\"sh\", \"-c\", "
-        "\"%s\", \"sh\", \"{scene}\", \"{out}\", \"{seed}\", \"{spp} {depth} {width} {height} "
-        "{threads}\"], \"output\": \"mean\"%s}",
-        K, script, more);
+    snprintf(json, sizeof json,
+             "{'name': 'fake', 'format': 'pbrt', 'image': 'pfm', 'expresses': "
+             "['diffuse', 'point'], 'replicates': %d, 'spp': 7, 'command': ['sh', '-c', "
+             "'%s', 'sh', '{scene}', '{out}', '{seed}', '{spp} {depth} {width} {height} "
+             "{threads}'], 'output': 'mean'%s}",
+             K, script, more);
     must_load(json, en);
+}
+
+/* An image of each replicate, of the number of its seed. */
+static void write_replicates(int num)
+{
+    for (int k = 0; k < num; k++) {
+        char name[64];
+        snprintf(name, sizeof name, "picture_%u.pfm", replicate_seed(SEED, k));
+        write_pfm(name, W, H, ramp, k);
+    }
 }
 
 static bool render(const struct engine *en, const struct suite_scene *s, struct moments *m,
@@ -89,11 +98,32 @@ static bool render(const struct engine *en, const struct suite_scene *s, struct 
     return engine_render(en, s, &opt, m, manifest, e);
 }
 
+/* The image of point_plane, and its seeds; frees the engine. */
+static struct moments must_render(struct engine *en, size_t num_seeds)
+{
+    struct moments m;
+    json_t *manifest;
+    struct err e = {""};
+    MUST(render(en, &point_plane, &m, &manifest, &e));
+    assert_int_equal(json_array_size(json_object_get(manifest, "seeds")), num_seeds);
+    json_decref(manifest);
+    engine_free(en);
+    return m;
+}
+
+/* The same by a description. */
+static struct moments image_of(const char *json, size_t num_seeds)
+{
+    struct engine en;
+    must_load(json, &en);
+    return must_render(&en, num_seeds);
+}
+
 TEST(shipped_descriptions_load)
 {
     static const char *const names[] = {"mitsuba",          "pbrt",    "povray_plain", "student",
                                         "pathtracer_again", "blender", "c-ray"};
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+    for (size_t i = 0; i < COUNT(names); i++) {
         char path[128];
         struct engine en;
         struct err e;
@@ -107,11 +137,10 @@ TEST(shipped_descriptions_load)
 TEST(members_are_read)
 {
     struct engine en;
-    must_load(
-        "{\"name\": \"a-1\", \"format\": \"cycles\", \"output\": \"mean\", \"image\": \"hdr\","
-        "\"command\": [\"x\", \"{scene}\", \"{out}\", \"{seed}\"], \"expresses\": [\"mirror\"],"
-        "\"depth_offset\": -1, \"spp\": 9, \"replicates\": 11}",
-        &en);
+    must_load("{'name': 'a-1', 'format': 'cycles', 'output': 'mean', 'image': 'hdr',"
+              "'command': ['x', '{scene}', '{out}', '{seed}'], 'expresses': ['mirror'],"
+              "'depth_offset': -1, 'spp': 9, 'replicates': 11}",
+              &en);
     assert_string_equal(en.name, "a-1");
     assert_ptr_equal(en.format, engine_kind_of("cycles"));
     assert_int_equal(en.output, OUTPUT_MEAN);
@@ -127,60 +156,58 @@ TEST(members_are_read)
 TEST(bad_descriptions_are_refused)
 {
     static const char *const good[][2] = {
-        {"name", "\"x\""},
-        {"format", "\"pbrt\""},
-        {"output", "\"mean\""},
-        {"command", "[\"x\", \"{scene}\", \"{out}\", \"{seed}\"]"},
-        {"expresses", "[\"diffuse\"]"},
+        {"name", "'x'"},
+        {"format", "'pbrt'"},
+        {"output", "'mean'"},
+        {"command", "['x', '{scene}', '{out}', '{seed}']"},
+        {"expresses", "['diffuse']"},
     };
-    enum { NUM_GOOD = sizeof good / sizeof *good };
+    enum { NUM_GOOD = COUNT(good) };
     static const char *const bad[][3] = {
         {"colour", "1", "unknown key 'colour'"},
         {"name", NULL, "missing key 'name'"},
-        {"name", "\"X\"", "a-z, 0-9"},
-        {"name", "\"../x\"", "a-z, 0-9"},
-        {"name", "\"cycles\"", "which this program uses itself"},
-        {"format", "\"obj\"", "'format' is 'obj', none of: cycles, povray, "},
-        {"format", "\"obj\"", "mitsuba, pbrt, dae"},
-        {"output", "\"variance\"", "none of: mean, exact, moments"},
-        {"output", "\"exact\"", "has a {seed}, but 'output' is 'exact'"},
+        {"name", "'X'", "a-z, 0-9"},
+        {"name", "'../x'", "a-z, 0-9"},
+        {"name", "'cycles'", "which this program uses itself"},
+        {"format", "'obj'", "'format' is 'obj', none of: cycles, povray, "},
+        {"format", "'obj'", "mitsuba, pbrt, dae"},
+        {"output", "'variance'", "none of: mean, exact, moments"},
+        {"output", "'exact'", "has a {seed}, but 'output' is 'exact'"},
         {"scale", "0", "'scale' is 0, not between"},
-        {"filter", "\"sinc:2\"", "'filter': a pixel filter is box"},
+        {"filter", "'sinc:2'", "'filter': a pixel filter is box"},
         {"filter", "1", "'filter' is not"},
         {"shared_samples", "true", "about a 'filter', which is not there"},
-        {"channels", "\"apart\"", "none of: together, separate"},
+        {"channels", "'apart'", "none of: together, separate"},
         {"margin", "0.1", "'margin' is not an object"},
-        {"margin", "{\"global\": 0.1, \"tile\": 0.2}", "missing key 'margin.reason'"},
-        {"margin", "{\"global\": 1, \"tile\": 0.2, \"reason\": \"x\"}", "'margin.global' is 1"},
-        {"margin", "{\"global\": 0.1, \"tiles\": 0.2}", "unknown key 'margin.tiles'"},
-        {"output", "\"noisy\"", "has a {seed}, but 'output' is 'noisy'"},
-        {"format", "\"file\"", "'expresses' is for scenes that are looked into"},
-        {"image", "\"png\"", "none of: exr, hdr, pfm"},
+        {"margin", "{'global': 0.1, 'tile': 0.2}", "missing key 'margin.reason'"},
+        {"margin", "{'global': 1, 'tile': 0.2, 'reason': 'x'}", "'margin.global' is 1"},
+        {"margin", "{'global': 0.1, 'tiles': 0.2}", "unknown key 'margin.tiles'"},
+        {"output", "'noisy'", "has a {seed}, but 'output' is 'noisy'"},
+        {"format", "'file'", "'expresses' is for scenes that are looked into"},
+        {"image", "'png'", "none of: exr, hdr, pfm"},
         {"command", "[]", "'command' is not a list of 1 to 256 texts"},
-        {"command", "\"x {scene}\"", "'command' is not a list"},
-        {"command", "[\"x\", 3]", "'command' [1] is not a text"},
-        {"command", "[\"\", \"{scene}\"]", "'command' [0] is not a text"},
-        {"command", "[\"x\", \"{scene}\", \"{seed}\"]", "'command' has no {out}"},
-        {"command", "[\"x\", \"{out}\", \"{seed}\"]", "'command' has no {scene}"},
-        {"command", "[\"x\", \"{out}\", \"{scene}\"]", "'command' has no {seed}"},
-        {"command", "[\"x\", \"{out}\", \"{scene}\", \"{seed}\", \"-s={samples}\"]",
+        {"command", "'x {scene}'", "'command' is not a list"},
+        {"command", "['x', 3]", "'command' [1] is not a text"},
+        {"command", "['', '{scene}']", "'command' [0] is not a text"},
+        {"command", "['x', '{scene}', '{seed}']", "'command' has no {out}"},
+        {"command", "['x', '{out}', '{seed}']", "'command' has no {scene}"},
+        {"command", "['x', '{out}', '{scene}']", "'command' has no {seed}"},
+        {"command", "['x', '{out}', '{scene}', '{seed}', '-s={samples}']",
          "'command' [4]: unknown placeholder '{samples}'"},
-        {"command", "[\"x\", \"{out}\", \"{scene}\", \"{seed\"]", "'command' [3]: a brace without"},
-        {"command", "[\"x\", \"{out}\", \"{scene}\", \"seed}\"]", "'command' [3]: a brace without"},
-        {"command", "[\"x\", \"{out}\", \"{scene}\", \"{seed}\", \"{}\"]",
-         "unknown placeholder '{}'"},
-        {"command", "[\"x\", \"{out}\", \"{scene}\", \"{seed}\\n\"]",
-         "'command' [3] is not one line"},
-        {"version", "[\"x\", \"{seed}\"]", "'version' [1]: unknown placeholder '{seed}'"},
-        {"expresses", "[\"diffuse\", \"hair\"]", "'expresses' [1]: 'hair' is no feature"},
+        {"command", "['x', '{out}', '{scene}', '{seed']", "'command' [3]: a brace without"},
+        {"command", "['x', '{out}', '{scene}', 'seed}']", "'command' [3]: a brace without"},
+        {"command", "['x', '{out}', '{scene}', '{seed}', '{}']", "unknown placeholder '{}'"},
+        {"command", "['x', '{out}', '{scene}', '{seed}\\n']", "'command' [3] is not one line"},
+        {"version", "['x', '{seed}']", "'version' [1]: unknown placeholder '{seed}'"},
+        {"expresses", "['diffuse', 'hair']", "'expresses' [1]: 'hair' is no feature"},
         {"expresses", "[7]", "'expresses' [0]"},
         {"depth_offset", "2", "'depth_offset' is 2, not in -1..1"},
         {"spp", "0.5", "'spp' is not a whole number"},
         {"replicates", "2", "'replicates' is 2, not in 3..4096"},
-        {"lens_args", "[\"-b\", \"{lens_radius}\", \"{focal_distance}\"]",
+        {"lens_args", "['-b', '{lens_radius}', '{focal_distance}']",
          "'lens_args' is for \"format\": \"dae\" only"},
     };
-    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+    for (size_t i = 0; i < COUNT(bad); i++) {
         char json[1024] = "{";
         bool replaced = false;
         for (size_t k = 0; k <= NUM_GOOD; k++) {
@@ -191,41 +218,38 @@ TEST(bad_descriptions_are_refused)
                 replaced = true;
             }
             if (value != NULL && (k < NUM_GOOD || !replaced))
-                snprintf(json + strlen(json), sizeof json - strlen(json), "%s\"%s\": %s",
+                snprintf(json + strlen(json), sizeof json - strlen(json), "%s'%s': %s",
                          strlen(json) > 1 ? ", " : "", key, value);
         }
         strcat(json, "}");
         struct engine en;
         struct err e = {0};
-        if (load(json, &en, &e))
-            fail_msg("accepted: %s", json);
-        if (strstr(e.msg, bad[i][2]) == NULL || strstr(e.msg, "engine.json") == NULL)
-            fail_msg("%s\n  gave: %s\n  not: %s", json, e.msg, bad[i][2]);
+        REFUSES(load(json, &en, &e), bad[i][2]);
+        assert_non_null(strstr(e.msg, "engine.json"));
     }
     struct engine en;
     struct err e;
-    REFUSES(load("{\"name\": }", &en, &e), "engine.json:1:");
-    assert_false(load("{\"name\": \"x\", \"name\": \"y\"}", &en, &e));
+    REFUSES(load("{'name': }", &en, &e), "engine.json:1:");
+    assert_false(load("{'name': 'x', 'name': 'y'}", &en, &e));
     assert_false(load("[]", &en, &e));
     REFUSES(engine_load(test_path("nothing.json"), &en, &e), "nothing.json: cannot read");
 }
 
 TEST(a_dae_needs_its_lens_on_the_command_line)
 {
-    const char *const head =
-        "{\"name\": \"x\", \"format\": \"dae\", \"output\": \"mean\", \"command\": "
-        "[\"x\", \"{scene}\", \"{out}\", \"{seed}\"], \"expresses\": ";
+    const char *const head = "{'name': 'x', 'format': 'dae', 'output': 'mean', 'command': "
+                             "['x', '{scene}', '{out}', '{seed}'], 'expresses': ";
     static const struct {
         const char *tail, *error;
     } cases[] = {
-        {"[\"lens\"]}", "come together"},
-        {"[], \"lens_args\": [\"{lens_radius}\", \"{focal_distance}\"]}", "come together"},
-        {"[\"lens\"], \"lens_args\": [\"{lens_radius}\"]}", "has no {focal_distance}"},
-        {"[\"lens\"], \"lens_args\": [\"{lens_radius}\", \"{focal_distance}\"]}", NULL},
-        {"[\"environment\"], \"environment_args\": [\"{scene}\"]}", "unknown placeholder"},
-        {"[\"environment\"], \"environment_args\": [\"-e{environment}\"]}", NULL},
+        {"['lens']}", "come together"},
+        {"[], 'lens_args': ['{lens_radius}', '{focal_distance}']}", "come together"},
+        {"['lens'], 'lens_args': ['{lens_radius}']}", "has no {focal_distance}"},
+        {"['lens'], 'lens_args': ['{lens_radius}', '{focal_distance}']}", NULL},
+        {"['environment'], 'environment_args': ['{scene}']}", "unknown placeholder"},
+        {"['environment'], 'environment_args': ['-e{environment}']}", NULL},
     };
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    for (size_t i = 0; i < COUNT(cases); i++) {
         char json[1024];
         struct engine en;
         struct err e = {0};
@@ -244,8 +268,8 @@ TEST(placeholders_are_filled_in)
     struct engine en;
     struct err e;
     char **argv;
-    must_load("{\"name\": \"x\", \"format\": \"pbrt\", \"output\": \"mean\", \"expresses\": [],"
-              "\"command\": [\"run\", \"\", \"{{{seed}}}\", \"{out}{out}\", \"a b;$(c) {scene}\"]}",
+    must_load("{'name': 'x', 'format': 'pbrt', 'output': 'mean', 'expresses': [],"
+              "'command': ['run', '', '{{{seed}}}', '{out}{out}', 'a b;$(c) {scene}']}",
               &en);
     const struct engine_value values[] = {{"scene", "s"}, {"out", "/o"}, {"seed", "12"}, {0}};
     const char *const command[] = {"command", NULL}, *const absent[] = {"version", NULL};
@@ -273,7 +297,7 @@ TEST(scenes_know_what_they_need)
         {"13_square_patch", 1u << FEATURE_DIFFUSE | 1u << FEATURE_AREA},
         {"41_cornell", 1u << FEATURE_DIFFUSE | 1u << FEATURE_AREA | 1u << FEATURE_SPHERE},
     };
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    for (size_t i = 0; i < COUNT(cases); i++) {
         const struct suite_scene *s = suite_shipped_scene(cases[i].name);
         struct scene scene;
         struct camera camera;
@@ -295,42 +319,37 @@ TEST(scenes_know_what_they_need)
 /* The features that no scene above has, one material or light at a time. */
 TEST(materials_and_lights_have_features)
 {
-    const struct material materials[] = {
-        {.kind = MATERIAL_MIRROR, .reflectance = {1, 1, 1}},
-        {.kind = MATERIAL_GLASS, .ior = 1.5f},
-        {.kind = MATERIAL_GLASS, .ior = 1.5f, .schlick = true},
-        {.kind = MATERIAL_REFRACTION, .ior = 1.5f},
-        {.kind = MATERIAL_MICROFACET, .microfacet = MICROFACET_GGX, .alpha = .1f},
-        {.kind = MATERIAL_MICROFACET, .microfacet = MICROFACET_BECKMANN, .alpha = .1f},
-        {.kind = MATERIAL_PLASTIC, .specular = {.1f, 0, 0}, .alpha = .1f},
-        {.kind = MATERIAL_PLASTIC, .specular = {.1f, 0, 0}, .mirror = {0, 0, .1f}, .alpha = .1f},
-        {.radiance = {1, 1, 1}, .radiance_both_sides = true},
+    static const struct {
+        struct material m;
+        unsigned features;
+    } of[] = {
+        {{.kind = MATERIAL_MIRROR, .reflectance = {1, 1, 1}}, 1u << FEATURE_MIRROR},
+        {{.kind = MATERIAL_GLASS, .ior = 1.5f}, 1u << FEATURE_GLASS},
+        {{.kind = MATERIAL_GLASS, .ior = 1.5f, .schlick = true}, 1u << FEATURE_SCHLICK},
+        {{.kind = MATERIAL_REFRACTION, .ior = 1.5f}, 1u << FEATURE_REFRACTION},
+        {{.kind = MATERIAL_MICROFACET, .alpha = .1f}, 1u << FEATURE_MICROFACET},
+        {{.kind = MATERIAL_MICROFACET, .microfacet = MICROFACET_BECKMANN, .alpha = .1f},
+         1u << FEATURE_BECKMANN},
+        {{.kind = MATERIAL_PLASTIC, .specular = {.1f, 0, 0}, .alpha = .1f}, 1u << FEATURE_PLASTIC},
+        {{.kind = MATERIAL_PLASTIC, .specular = {.1f, 0, 0}, .mirror = {0, 0, .1f}, .alpha = .1f},
+         1u << FEATURE_PLASTIC | 1u << FEATURE_MIRROR},
+        {{.radiance = {1, 1, 1}, .radiance_both_sides = true}, 1u << FEATURE_TWO_SIDED},
     };
-    const unsigned of_material[] = {
-        1u << FEATURE_MIRROR,     1u << FEATURE_GLASS,
-        1u << FEATURE_SCHLICK,    1u << FEATURE_REFRACTION,
-        1u << FEATURE_MICROFACET, 1u << FEATURE_BECKMANN,
-        1u << FEATURE_PLASTIC,    1u << FEATURE_PLASTIC | 1u << FEATURE_MIRROR,
-        1u << FEATURE_TWO_SIDED};
-    const struct light lights[] = {
-        {.kind = LIGHT_SPOT, .value = {1, 1, 1}, .axis = {0, 1, 0}, .attenuation = {0, 0, 1}},
-        {.kind = LIGHT_DIRECTIONAL, .value = {1, 1, 1}, .to_light = {0, 1, 0}},
-    };
-    const unsigned of_light[] = {1u << FEATURE_SPOT, 1u << FEATURE_DIRECTIONAL};
     for (size_t i = 0; i < 13; i++) {
         struct scene s = build_scene();
-        struct camera c;
         struct err e;
         unsigned want = 0;
-        uint32_t m = build_material(&s, grey(0), grey(0));
-        if (i < 9) {
-            s.materials[m] = materials[i];
-            want = of_material[i];
-        }
+        uint32_t m = build_like(&s, i < 9 ? of[i].m : (struct material){0});
+        if (i < 9)
+            want = of[i].features;
         build_quad(&s, v3(-1, -1, -3), v3(2, 0, 0), v3(0, 2, 0), m);
-        if (i == 9 || i == 10) {
-            build_light(&s, lights[i - 9]);
-            want = of_light[i - 9];
+        if (i == 9) {
+            build_spot(&s, v3(0, 0, 0), v3(0, 1, 0), 0, 0, grey(1));
+            want = 1u << FEATURE_SPOT;
+        }
+        if (i == 10) {
+            build_sun(&s, v3(0, 1, 0), grey(1));
+            want = 1u << FEATURE_DIRECTIONAL;
         }
         if (i == 11) { /* tilted by 0.01, a little over half a degree */
             s.normal[0] = normalize(v3(0.01f, 0, 1));
@@ -343,8 +362,7 @@ TEST(materials_and_lights_have_features)
             want = 1u << FEATURE_DIFFUSE | 1u << FEATURE_TEXTURE;
         }
         build_camera(&s, v3(0, 0, 0), 40);
-        if (!scene_finish(&s, "test", &e) || !camera_init(&c, &s, 8, 8, &e))
-            fail_msg("%s", e.msg);
+        const struct camera c = build_finish(&s, 8, 8);
         assert_int_equal(features_of_scene(&s, &c), want);
         assert_int_equal(features_check_textures("x", &s, &e), i != 12);
         assert_true(i != 12 ||
@@ -357,8 +375,8 @@ TEST(what_cannot_be_expressed_is_said)
 {
     struct engine en;
     struct err e;
-    must_load("{\"name\": \"x\", \"format\": \"povray\", \"output\": \"mean\", \"expresses\": "
-              "[\"diffuse\", \"point\"], \"command\": [\"x\", \"{scene}\", \"{out}\", \"{seed}\"]}",
+    must_load("{'name': 'x', 'format': 'povray', 'output': 'mean', 'expresses': "
+              "['diffuse', 'point'], 'command': ['x', '{scene}', '{out}', '{seed}']}",
               &en);
     assert_true(engine_expresses(&en, &point_plane, test_path("."), &e));
     assert_false(engine_expresses(&en, suite_shipped_scene("41_cornell"), test_path("."), &e));
@@ -379,14 +397,10 @@ TEST(replicates_are_folded)
     struct moments m;
     json_t *manifest;
     struct err e;
-    for (int k = 0; k < K; k++) {
-        char name[64];
-        snprintf(name, sizeof name, "picture_%u.pfm", replicate_seed(SEED, k));
-        write_pfm(name, W, H, ramp, k);
-    }
+    write_replicates(K);
     engine_of_script("cp {here}/picture_$3.pfm $2 && test -s $1 && echo $4 > {here}/args",
-                     ", \"version\": [\"sh\", \"-c\", \"echo; echo Fake 3.1; echo more\"], "
-                     "\"depth_offset\": 1",
+                     ", 'version': ['sh', '-c', 'echo; echo Fake 3.1; echo more'], "
+                     "'depth_offset': 1",
                      &en);
     MUST(render(&en, &point_plane, &m, &manifest, &e));
     assert_string_equal(m.unit, "replicate");
@@ -403,7 +417,7 @@ TEST(replicates_are_folded)
                                           {"scene", "12_point_plane"},
                                           {"unit", "replicate"},
                                           {"version", "Fake 3.1"}};
-    for (size_t i = 0; i < sizeof text / sizeof *text; i++)
+    for (size_t i = 0; i < COUNT(text); i++)
         assert_string_equal(json_string_value(json_object_get(manifest, text[i][0])), text[i][1]);
     const json_t *seeds = json_object_get(manifest, "seeds");
     assert_int_equal(json_array_size(seeds), K);
@@ -438,28 +452,19 @@ TEST(replicates_are_folded)
  * much (test_camera.c), one from which each pixel draws its own nothing. */
 TEST(pixels_that_share_samples_count_as_noisier)
 {
-    static const char *const more[] = {", \"filter\": \"tent:1\"",
-                                       ", \"filter\": \"tent:1\", \"shared_samples\": false"};
+    static const char *const more[] = {", 'filter': 'tent:1'",
+                                       ", 'filter': 'tent:1', 'shared_samples': false"};
     for (int i = 0; i < 2; i++) {
         struct engine en;
-        struct moments m;
-        json_t *manifest;
-        struct err e = {""};
-        for (int k = 0; k < K; k++) {
-            char name[64];
-            snprintf(name, sizeof name, "picture_%u.pfm", replicate_seed(SEED, k));
-            write_pfm(name, W, H, ramp, k);
-        }
+        write_replicates(K);
         engine_of_script("cp {here}/picture_$3.pfm $2 && grep -q triangle $1", more[i], &en);
-        MUST(render(&en, &point_plane, &m, &manifest, &e));
+        struct moments m = must_render(&en, K);
         for (int p = 0; p < PIXELS; p++) {
             double x = p + 1, m2 = (i == 0 ? 2.25 : 1) * 26 / 3 * x * x;
             assert_true(fabs(m.mean[3 * p] - 8 * x / 3) < 1e-6 * x);
             assert_true(fabs(m.m2[3 * p] - m2) < 1e-5 * m2);
         }
-        json_decref(manifest);
         moments_free(&m);
-        engine_free(&en);
     }
 }
 
@@ -471,17 +476,10 @@ TEST(channels_are_rendered_apart)
                                            {"[2 2 2]", "[0.600000024 0.600000024 0.600000024]"},
                                            {"[1 1 1]", "[0.699999988 0.699999988 0.699999988]"}};
     struct engine en;
-    struct moments m;
-    json_t *manifest;
-    struct err e;
-    for (int k = 0; k < 3 * K; k++) {
-        char name[64];
-        snprintf(name, sizeof name, "picture_%u.pfm", replicate_seed(SEED, k));
-        write_pfm(name, W, H, ramp, k);
-    }
+    write_replicates(3 * K);
     engine_of_script("cp {here}/picture_$3.pfm $2 && cp $1 {here}/scene_$3",
-                     ", \"channels\": \"separate\"", &en);
-    MUST(render(&en, &point_plane, &m, &manifest, &e));
+                     ", 'channels': 'separate'", &en);
+    struct moments m = must_render(&en, (size_t)3 * K);
     for (int p = 0; p < PIXELS; p++) {
         double x = p + 1;
         assert_true(m.n[p] == K);
@@ -489,7 +487,6 @@ TEST(channels_are_rendered_apart)
         assert_true(fabs(m.m2[3 * p] - 702 * x * x) < 1e-11 * x * x);
         assert_true(m.mean[3 * p + 1] == 2 && m.mean[3 * p + 2] == 0);
     }
-    assert_int_equal(json_array_size(json_object_get(manifest, "seeds")), 3 * K);
     for (int k = 0; k < 3 * K; k++) {
         char name[64];
         snprintf(name, sizeof name, "scene_%u", replicate_seed(SEED, k));
@@ -498,76 +495,57 @@ TEST(channels_are_rendered_apart)
         assert_non_null(strstr(text, grey[k % 3][1]));
         free(text);
     }
-    json_decref(manifest);
     moments_free(&m);
-    engine_free(&en);
 }
 
 TEST(images_without_noise_are_exact)
 {
     struct engine en;
-    struct moments m;
-    json_t *manifest;
     struct err e;
     write_pfm("constant.pfm", W, H, constant, 0);
     engine_of_script("cp {here}/constant.pfm $2", "", &en);
-    MUST(render(&en, &point_plane, &m, &manifest, &e));
+    struct moments m = must_render(&en, K);
     assert_string_equal(m.unit, "exact");
     assert_true(m.n[0] == 1 && m.mean[0] == 0.25 && m.m2[0] == 0 && m.m3[0] == 0);
-    json_decref(manifest);
     moments_free(&m);
-    engine_free(&en);
     /* "exact" by declaration: one run, pixels may differ. */
     write_pfm("ramp.pfm", W, H, ramp, 0);
-    must_load("{\"name\": \"x\", \"format\": \"pbrt\", \"output\": \"exact\", \"image\": \"pfm\", "
-              "\"expresses\": [\"diffuse\", \"point\"], \"command\": [\"sh\", \"-c\", \"cp "
-              "{here}/ramp.pfm {out} # {scene}\"]}",
-              &en);
-    MUST(render(&en, &point_plane, &m, &manifest, &e));
+    m = image_of("{'name': 'x', 'format': 'pbrt', 'output': 'exact', 'image': 'pfm', "
+                 "'expresses': ['diffuse', 'point'], "
+                 "'command': ['sh', '-c', 'cp {here}/ramp.pfm {out} # {scene}']}",
+                 0);
     assert_string_equal(m.unit, "exact");
     assert_true(m.n[11] == 1 && m.mean[3 * 11] == 12 && m.m2[3 * 11] == 0);
-    assert_int_equal(json_array_size(json_object_get(manifest, "seeds")), 0);
-    json_decref(manifest);
     moments_free(&m);
-    engine_free(&en);
     /* Its unit is 0.25 of ours. */
-    must_load(
-        "{\"name\": \"x\", \"format\": \"file\", \"output\": \"exact\", \"image\": \"pfm\", "
-        "\"scale\": 0.25, \"command\": [\"sh\", \"-c\", \"cp {here}/ramp.pfm {out} # {scene}\"]}",
-        &en);
-    MUST(render(&en, &point_plane, &m, &manifest, &e));
+    m = image_of("{'name': 'x', 'format': 'file', 'output': 'exact', 'image': 'pfm', "
+                 "'scale': 0.25, 'command': ['sh', '-c', 'cp {here}/ramp.pfm {out} # {scene}']}",
+                 0);
     assert_true(m.mean[3 * 11] == 3 && m.mean[3 * 11 + 1] == 0.5);
-    json_decref(manifest);
     moments_free(&m);
-    engine_free(&en);
     struct moments own;
-    assert_true(moments_alloc(&own, W, H, &e));
+    MUST(moments_alloc(&own, W, H, &e));
     for (int p = 0; p < PIXELS; p++) {
         own.n[p] = 5;
         own.mean[3 * p] = own.m2[3 * p] = own.m3[3 * p] = 1;
     }
-    assert_true(moments_write(test_path("own.exr"), &own, NULL, 0, &e));
+    MUST(moments_write(test_path("own.exr"), &own, NULL, 0, &e));
     moments_free(&own);
-    must_load("{\"name\": \"x\", \"format\": \"file\", \"output\": \"moments\", \"scale\": 0.25, "
-              "\"command\": [\"sh\", \"-c\", \"cp {here}/own.exr {out} # {scene}\"]}",
-              &en);
-    MUST(render(&en, &point_plane, &m, &manifest, &e));
+    m = image_of("{'name': 'x', 'format': 'file', 'output': 'moments', 'scale': 0.25, "
+                 "'command': ['sh', '-c', 'cp {here}/own.exr {out} # {scene}']}",
+                 1);
     assert_true(m.n[3] == 5 && m.mean[9] == 0.25 && m.m2[9] == 0.0625 && m.m3[9] == 0.015625);
-    json_decref(manifest);
     moments_free(&m);
-    engine_free(&en);
     /* "noisy": one run, too, and nothing is known of its noise. */
-    must_load("{\"name\": \"x\", \"format\": \"file\", \"output\": \"noisy\", \"image\": \"pfm\", "
-              "\"command\": [\"sh\", \"-c\", \"cp {here}/ramp.pfm {out} # {scene} {name}\"]}",
-              &en);
+    static const char noisy[] =
+        "{'name': 'x', 'format': 'file', 'output': 'noisy', 'image': 'pfm', "
+        "'command': ['sh', '-c', 'cp {here}/ramp.pfm {out} # {scene} {name}']}";
+    must_load(noisy, &en);
     assert_true(engine_expresses(&en, &point_plane, test_path("."), &e));
-    MUST(render(&en, &point_plane, &m, &manifest, &e));
+    m = must_render(&en, 0);
     assert_string_equal(m.unit, "picture");
     assert_true(m.n[11] == 3 && m.mean[3 * 11] == 12 && m.m2[3 * 11] == 0);
-    assert_int_equal(json_array_size(json_object_get(manifest, "seeds")), 0);
-    json_decref(manifest);
     moments_free(&m);
-    engine_free(&en);
 }
 
 TEST(programs_that_misbehave_are_errors)
@@ -590,7 +568,7 @@ TEST(programs_that_misbehave_are_errors)
         {"cp {here}/grey.pfm $2", "no channels R, G and B"},
         {"cp {here}/ramp.pfm $2", "replicate 1 is the same image as an earlier one: the seed has"},
     };
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    for (size_t i = 0; i < COUNT(cases); i++) {
         struct engine en;
         struct moments m;
         json_t *manifest;
@@ -607,8 +585,8 @@ TEST(programs_that_misbehave_are_errors)
     struct moments m;
     json_t *manifest;
     struct err e = {0};
-    must_load("{\"name\": \"x\", \"format\": \"pbrt\", \"output\": \"mean\", \"expresses\": [], "
-              "\"command\": [\"./no-such-program\", \"{scene}\", \"{out}\", \"{seed}\"]}",
+    must_load("{'name': 'x', 'format': 'pbrt', 'output': 'mean', 'expresses': [], "
+              "'command': ['./no-such-program', '{scene}', '{out}', '{seed}']}",
               &en);
     assert_false(render(&en, &point_plane, &m, &manifest, &e));
     /* Beside the description, not where we stand. */

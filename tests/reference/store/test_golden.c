@@ -56,6 +56,8 @@ static int teardown(void **state)
     return ok ? 0 : -1;
 }
 
+#define STORE(name) TEST_OF(fixture, name, setup, teardown)
+
 static void write_golden(struct fixture *f)
 {
     struct err e;
@@ -74,9 +76,8 @@ static void assert_refused(struct fixture *f, const char *why)
     assert_null(strchr(e.msg, '\n'));
 }
 
-TEST_WITH(what_was_written_comes_back, setup, teardown)
+STORE(what_was_written_comes_back)
 {
-    struct fixture *f = *state;
     struct err e;
     struct moments m;
     json_t *manifest;
@@ -101,9 +102,8 @@ TEST_WITH(what_was_written_comes_back, setup, teardown)
 }
 
 /* No clock gets into the image: dates are the manifest's. */
-TEST_WITH(the_same_moments_have_the_same_bytes, setup, teardown)
+STORE(the_same_moments_have_the_same_bytes)
 {
-    struct fixture *f = *state;
     struct err e;
     char first[65], second[65];
     write_golden(f);
@@ -114,9 +114,8 @@ TEST_WITH(the_same_moments_have_the_same_bytes, setup, teardown)
     assert_string_equal(first, second);
 }
 
-TEST_WITH(engines_share_a_manifest, setup, teardown)
+STORE(engines_share_a_manifest)
 {
-    struct fixture *f = *state;
     struct err e;
     struct moments m;
     json_t *manifest;
@@ -135,18 +134,16 @@ TEST_WITH(engines_share_a_manifest, setup, teardown)
     json_decref(all);
 }
 
-TEST_WITH(a_missing_golden_is_named, setup, teardown)
+STORE(a_missing_golden_is_named)
 {
-    struct fixture *f = *state;
     assert_refused(f, "cycles.exr: no golden of cycles");
     write_golden(f);
     strcpy(f->ref.engine, "povray");
     assert_refused(f, "povray.exr: no golden of povray");
 }
 
-TEST_WITH(a_golden_of_another_scene_or_setting_is_refused, setup, teardown)
+STORE(a_golden_of_another_scene_or_setting_is_refused)
 {
-    struct fixture *f = *state;
     write_golden(f);
     const struct suite_scene scene = f->scene;
     const struct suite_reference ref = f->ref;
@@ -170,9 +167,8 @@ TEST_WITH(a_golden_of_another_scene_or_setting_is_refused, setup, teardown)
 }
 
 /* A new image whose manifest was never written: the state after a crash in golden_write(). */
-TEST_WITH(an_image_without_its_manifest_is_refused, setup, teardown)
+STORE(an_image_without_its_manifest_is_refused)
 {
-    struct fixture *f = *state;
     struct err e;
     write_golden(f);
     f->m.mean[0] += 1;
@@ -195,9 +191,8 @@ static void assert_first_value(struct fixture *f, double want)
 
 /* Every state that a kill in golden_write() can leave: the new image waits, the manifest is the old one; the manifest
  * is the new one, the image waits still. Then another update. Mean of pixel 0: 5/3, by hand above. */
-TEST_WITH(a_killed_update_leaves_the_old_pair_or_the_new, setup, teardown)
+STORE(a_killed_update_leaves_the_old_pair_or_the_new)
 {
-    struct fixture *f = *state;
     char next[160], old[160];
     snprintf(next, sizeof next, "%s.next", f->exr);
     snprintf(old, sizeof old, "%s.old", f->exr);
@@ -245,9 +240,8 @@ static void replace_manifest(struct fixture *f, const char *text)
     fclose(out);
 }
 
-TEST_WITH(a_broken_manifest_is_an_error_and_is_not_overwritten, setup, teardown)
+STORE(a_broken_manifest_is_an_error_and_is_not_overwritten)
 {
-    struct fixture *f = *state;
     struct err e;
     write_golden(f);
     replace_manifest(f, "{\n\"cycles\": ");
@@ -263,9 +257,8 @@ TEST_WITH(a_broken_manifest_is_an_error_and_is_not_overwritten, setup, teardown)
 }
 
 /* Both hashes fit, but the image holds other observations than its manifest says. */
-TEST_WITH(an_image_that_contradicts_its_manifest_is_refused, setup, teardown)
+STORE(an_image_that_contradicts_its_manifest_is_refused)
 {
-    struct fixture *f = *state;
     f->m.n[3] = 2;
     write_golden(f);
     assert_refused(f, "pixel 3 holds 2 observations, not 3");
@@ -275,9 +268,8 @@ TEST_WITH(an_image_that_contradicts_its_manifest_is_refused, setup, teardown)
     assert_refused(f, "its unit is not that of its manifest");
 }
 
-TEST_WITH(a_closed_form_with_other_numbers_is_refused, setup, teardown)
+STORE(a_closed_form_with_other_numbers_is_refused)
 {
-    struct fixture *f = *state;
     struct err e;
     struct moments m;
     json_t *back, *one = json_pack("{sf}", "radiance", 1.0),
@@ -366,9 +358,8 @@ TEST(neighbouring_seeds_have_nothing_in_common)
     assert_true(worst_bit(next_sum, 20000) > 5.5);
 }
 
-TEST_WITH(a_reference_that_cannot_be_made_says_which, setup, teardown)
+STORE(a_reference_that_cannot_be_made_says_which)
 {
-    struct fixture *f = *state;
     struct err e;
     struct moments m;
     json_t *manifest;

@@ -3,32 +3,24 @@
 #include "renderer/scene/environment.h"
 #include "renderer/base/fs.h"
 #include "renderer/base/sha256.h"
+#include "tests/support/build_scene.h"
 #include "tests/support/test.h"
 
 static const char shipped[] = "reference/scenes";
 
-/* Writes dir/name. */
+/* Writes dir/name of test_path(). */
 static void put(const char *dir, const char *name, const char *text)
 {
-    char path[4096];
+    char path[256];
     snprintf(path, sizeof path, "%s/%s", dir, name);
-    FILE *f = fopen(path, "wb");
-    assert_non_null(f);
-    assert_int_equal(fputs(text, f) >= 0, 1);
-    assert_int_equal(fclose(f), 0);
+    test_write_json(test_path(path), text);
 }
 
-/* An empty directory; the caller removes it with drop_dir(). */
-static void make_dir(char dir[64])
-{
-    snprintf(dir, 64, "/tmp/test_suite.XXXXXX");
-    assert_non_null(mkdtemp(dir));
-}
-
-static void drop_dir(const char *dir)
+static const char *make_dir(const char *name)
 {
     struct err e;
-    MUST(fs_remove_tree(dir, &e));
+    MUST(fs_make_dirs(test_path(name), &e));
+    return name;
 }
 
 static void load_shipped(struct suite *s)
@@ -174,6 +166,16 @@ static void albedos_are_2_percent_apart(const char *line_a, const char *line_b)
         assert_true(b[c] > 1.0199999 * a[c] && b[c] < 1.0200001 * a[c]);
 }
 
+/* Both lines are `format` of a number each, the second of more than low and less than high times the first. */
+static void factor(const char *line_a, const char *line_b, const char *format, double low,
+                   double high)
+{
+    double a, b;
+    assert_int_equal(sscanf(line_a, format, &a), 1); // NOLINT(clang-diagnostic-format-nonliteral)
+    assert_int_equal(sscanf(line_b, format, &b), 1); // NOLINT(clang-diagnostic-format-nonliteral)
+    assert_true(b > low * a && b < high * a);
+}
+
 /* Half a pixel at the image's centre: atan(tan(39.6 deg / 2) / 128) = 0.16115402 deg. */
 static void turn_is_half_a_pixel(const char *line_a, const char *line_b)
 {
@@ -185,18 +187,12 @@ static void turn_is_half_a_pixel(const char *line_a, const char *line_b)
 
 static void index_is_3_percent_less(const char *line_a, const char *line_b)
 {
-    double a, b;
-    assert_int_equal(sscanf(line_a, " <ior>%lf</ior>", &a), 1);
-    assert_int_equal(sscanf(line_b, " <ior>%lf</ior>", &b), 1);
-    assert_true(b > 0.9699999 * a && b < 0.9700001 * a);
+    factor(line_a, line_b, " <ior>%lf</ior>", 0.9699999, 0.9700001);
 }
 
 static void alphas_are_10_percent_apart(const char *line_a, const char *line_b)
 {
-    double a, b;
-    assert_int_equal(sscanf(line_a, " <alpha>%lf</alpha>", &a), 1);
-    assert_int_equal(sscanf(line_b, " <alpha>%lf</alpha>", &b), 1);
-    assert_true(b > 1.0999999 * a && b < 1.1000001 * a);
+    factor(line_a, line_b, " <alpha>%lf</alpha>", 1.0999999, 1.1000001);
 }
 
 static void no_line_differs(const char *line_a, const char *line_b)
@@ -235,31 +231,24 @@ TEST(scenes_that_differ_differ_as_stated)
 /* Test vectors of FIPS 180-2, appendix B.1 and B.3, and of the empty message. */
 TEST(sha256_matches_the_standard)
 {
-    char dir[64], path[128], hex[65];
+    static char million[1000001];
+    memset(million, 'a', sizeof million - 1);
+    const char *const cases[][2] = {
+        {"", "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855"},
+        {"abc", "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"},
+        {million, "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0"}};
+    const char *path = test_path("message");
+    char hex[65];
     struct err e;
-    make_dir(dir);
-    snprintf(path, sizeof path, "%s/message", dir);
-    put(dir, "message", "");
-    assert_true(sha256_file(path, hex, &e));
-    assert_string_equal(hex, "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
-    put(dir, "message", "abc");
-    assert_true(sha256_file(path, hex, &e));
-    char of_text[65];
-    sha256_text("abc", of_text);
-    assert_string_equal(of_text, hex);
-    assert_string_equal(hex, "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
-    char *million = malloc(1000001);
-    assert_non_null(million);
-    memset(million, 'a', 1000000);
-    million[1000000] = '\0';
-    put(dir, "message", million);
-    free(million);
-    assert_true(sha256_file(path, hex, &e));
-    assert_string_equal(hex, "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0");
-    assert_false(sha256_file(dir, hex, &e));
-    snprintf(path, sizeof path, "%s/absent", dir);
-    REFUSES(sha256_file(path, hex, &e), "absent: No such file");
-    drop_dir(dir);
+    for (size_t i = 0; i < COUNT(cases); i++) {
+        test_write_text(path, cases[i][0]);
+        MUST(sha256_file(path, hex, &e));
+        assert_string_equal(hex, cases[i][1]);
+        sha256_text(cases[i][0], hex);
+        assert_string_equal(hex, cases[i][1]);
+    }
+    assert_false(sha256_file(test_path("."), hex, &e));
+    REFUSES(sha256_file(test_path("absent"), hex, &e), "absent: No such file");
 }
 
 TEST(verdicts_have_names)
@@ -277,143 +266,150 @@ TEST(verdicts_have_names)
 
 static const char good[] =
     "{\n"
-    "  \"title\": \"A title\", \"detects\": \"this\", \"blind_to\": \"that\",\n"
-    "  \"width\": 64, \"height\": 32, \"depth\": 1, \"spp\": 16, \"tile\": 16,\n"
-    "  \"expect\": \"EQUIVALENT\",\n"
-    "  \"references\": {\n"
-    "    \"cycles\": {\"class\": \"exact\", \"margin_global\": 0.004, \"margin_tile\": 0.02,\n"
-    "               \"replicates\": 8, \"spp\": 64},\n"
-    "    \"povray\": {\"class\": \"limit\", \"margin_global\": 0.005, \"margin_tile\": 0.03,\n"
-    "               \"replicates\": 9, \"subgrid\": 3},\n"
-    "    \"truth\": {\"class\": \"approximate\", \"margin_global\": 0.002, \"margin_tile\": 0.01,\n"
-    "              \"kind\": \"furnace\", \"values\": {}}\n"
+    "  'title': 'A title', 'detects': 'this', 'blind_to': 'that',\n"
+    "  'width': 64, 'height': 32, 'depth': 1, 'spp': 16, 'tile': 16,\n"
+    "  'expect': 'EQUIVALENT',\n"
+    "  'references': {\n"
+    "    'cycles': {'class': 'exact', 'margin_global': 0.004, 'margin_tile': 0.02,\n"
+    "               'replicates': 8, 'spp': 64},\n"
+    "    'povray': {'class': 'limit', 'margin_global': 0.005, 'margin_tile': 0.03,\n"
+    "               'replicates': 9, 'subgrid': 3},\n"
+    "    'truth': {'class': 'approximate', 'margin_global': 0.002, 'margin_tile': 0.01,\n"
+    "              'kind': 'furnace', 'values': {}}\n"
     "  }\n"
     "}\n";
 
-static const char good_9x[] =
-    "{\"title\": \"A title\", \"detects\": \"this\", \"blind_to\": \"that\",\n"
-    " \"width\": 64, \"height\": 32, \"depth\": 1, \"spp\": 16, \"tile\": 16,\n"
-    " \"expect\": \"DIFFERENT\", \"references_of\": \"42_good\"}\n";
+static const char good_9x[] = "{'title': 'A title', 'detects': 'this', 'blind_to': 'that',\n"
+                              " 'width': 64, 'height': 32, 'depth': 1, 'spp': 16, 'tile': 16,\n"
+                              " 'expect': 'DIFFERENT', 'references_of': '42_good'}\n";
 
-/* Edits to one of the two files above: `from` becomes `to`; `message` is a part of the line that
- * must come out, file name first. */
+/* Edits to one of those two files: `from` becomes `to`, "+" puts it behind a member; `message` is a part of the line that must
+ * come out, file name first. */
 static const struct fault {
-    bool in_9x;
     const char *from, *to, *message;
 } faults[] = {
-    {false, "\"title\": \"A title\"", "\"titel\": \"A title\"",
-     "42_good.json: unknown key 'titel'"},
-    {false, "\"title\": \"A title\",", "", "42_good.json: missing key 'title'"},
-    {false, "\"A title\"", "7", "42_good.json: 'title' is not a text"},
-    {false, "\"A title\"", "\"\"", "42_good.json: 'title' is empty"},
-    {false, "\"A title\"", "\"two\\nlines\"", "42_good.json: 'title' is not one line"},
-    {false, "\"A title\"",
-     "\"0123456789012345678901234567890123456789012345678901234567890123"
-     "0123456789012345678901234567890123456789012345678901234567890123\"",
+    {"'title': 'A title'", "'titel': 'A title'", "42_good.json: unknown key 'titel'"},
+    {"'title': 'A title',", "", "42_good.json: missing key 'title'"},
+    {"'A title'", "7", "42_good.json: 'title' is not a text"},
+    {"'A title'", "''", "42_good.json: 'title' is empty"},
+    {"'A title'", "'two\\nlines'", "42_good.json: 'title' is not one line"},
+    {"'A title'",
+     "'012345678901234567890123456789012345678901234567890123456789012301234567890123456789"
+     "01234567890123456789012345678901234567890123'",
      "42_good.json: 'title' is longer than 127 bytes"},
-    {false, "\"blind_to\": \"that\",", "", "42_good.json: missing key 'blind_to'"},
-    {false, "\"width\": 64", "\"width\": 64.0", "42_good.json: 'width' is not a whole number"},
-    {false, "\"width\": 64", "\"width\": \"64\"", "42_good.json: 'width' is not a whole number"},
-    {false, "\"width\": 64", "\"width\": 0", "42_good.json: 'width' is 0, not in 1..16384"},
-    {false, "\"width\": 64", "\"width\": 4294967360",
-     "42_good.json: 'width' is 4294967360, not in"},
-    {false, "\"height\": 32", "\"height\": -32", "42_good.json: 'height' is -32, not in"},
-    {false, "\"tile\": 16", "\"tile\": 0", "42_good.json: 'tile' is 0"},
-    {false, "\"depth\": 1", "\"depth\": -1", "42_good.json: 'depth' is -1"},
-    {false, "\"spp\": 16", "\"spp\": 1", "42_good.json: 'spp' is 1, not in 2.."},
-    {false, "EQUIVALENT", "DIFFERENT", "but scenes of family 4 must be"},
-    {false, "EQUIVALENT", "EQUAL", "42_good.json: 'expect' is 'EQUAL'"},
-    {false, "EQUIVALENT", "INCONCLUSIVE", "42_good.json: 'expect' is 'INCONCLUSIVE'"},
-    {false, "\"references\"", "\"references_of\": \"42_good\", \"references\"",
+    {"'blind_to': 'that',", "", "42_good.json: missing key 'blind_to'"},
+    {"'width': 64", "'width': 64.0", "42_good.json: 'width' is not a whole number"},
+    {"'width': 64", "'width': '64'", "42_good.json: 'width' is not a whole number"},
+    {"'width': 64", "'width': 0", "42_good.json: 'width' is 0, not in 1..16384"},
+    {"'width': 64", "'width': 4294967360", "42_good.json: 'width' is 4294967360, not in"},
+    {"'height': 32", "'height': -32", "42_good.json: 'height' is -32, not in"},
+    {"'tile': 16", "'tile': 0", "42_good.json: 'tile' is 0"},
+    {"'depth': 1", "'depth': -1", "42_good.json: 'depth' is -1"},
+    {"'spp': 16", "'spp': 1", "42_good.json: 'spp' is 1, not in 2.."},
+    {"EQUIVALENT", "DIFFERENT", "but scenes of family 4 must be"},
+    {"EQUIVALENT", "EQUAL", "42_good.json: 'expect' is 'EQUAL'"},
+    {"EQUIVALENT", "INCONCLUSIVE", "42_good.json: 'expect' is 'INCONCLUSIVE'"},
+    {"'references'", "'references_of': '42_good', 'references'",
      "42_good.json: unknown key 'references_of'"},
-    {false, "\"cycles\"", "\"arnold\"", "42_good.json: unknown engine 'references.arnold'"},
-    {false, "\"cycles\"", "\"povray\"", "42_good.json:8: duplicate object key"},
-    {false, "\"spp\": 64", "\"subgrid\": 64",
-     "42_good.json: unknown key 'references.cycles.subgrid'"},
-    {false, ", \"spp\": 64", "", "42_good.json: missing key 'references.cycles.spp'"},
-    {false, "\"spp\": 64", "\"spp\": 0", "42_good.json: 'references.cycles.spp' is 0"},
-    {false, "\"replicates\": 8", "\"replicates\": 1",
+    {"'cycles'", "'arnold'", "42_good.json: unknown engine 'references.arnold'"},
+    {"'cycles'", "'povray'", "42_good.json:8: duplicate object key"},
+    {"'spp': 64", "'subgrid': 64", "42_good.json: unknown key 'references.cycles.subgrid'"},
+    {", 'spp': 64", "", "42_good.json: missing key 'references.cycles.spp'"},
+    {"'spp': 64", "'spp': 0", "42_good.json: 'references.cycles.spp' is 0"},
+    {"'replicates': 8", "'replicates': 1",
      "42_good.json: 'references.cycles.replicates' is 1, not in 2.."},
-    {false, "\"class\": \"exact\"", "\"class\": \"good\"",
-     "42_good.json: 'references.cycles.class' is 'good'"},
-    {false, "\"class\": \"exact\", ", "", "42_good.json: missing key 'references.cycles.class'"},
-    {false, "0.004", "0", "42_good.json: 'references.cycles.margin_global' is 0, not between"},
-    {false, "0.004", "1", "42_good.json: 'references.cycles.margin_global' is 1, not between"},
-    {false, "0.004", "-0.1", "42_good.json: 'references.cycles.margin_global' is -0.1"},
-    {false, "0.03", "\"3 %\"", "42_good.json: 'references.povray.margin_tile' is not a number"},
-    {false, "\"subgrid\": 3", "\"subgrid\": 65", "'references.povray.subgrid' is 65, not in 1..64"},
-    {false, "\"subgrid\": 3", "\"spp\": 3", "unknown key 'references.povray.spp'"},
-    {false, "\"kind\": \"furnace\", ", "", "missing key 'references.truth.kind'"},
-    {false, "\"values\": {}", "\"values\": []", "'references.truth.values' is not an object"},
-    {false, "\"kind\"", "\"replicates\": 8, \"kind\"", "unknown key 'references.truth.replicates'"},
-    {false, "\"spp\": 16", "\"spp\": 16, \"environment\": \"a/b.exr\"",
+    {"'class': 'exact'", "'class': 'good'", "42_good.json: 'references.cycles.class' is 'good'"},
+    {"'class': 'exact', ", "", "42_good.json: missing key 'references.cycles.class'"},
+    {"0.004", "0", "42_good.json: 'references.cycles.margin_global' is 0, not between"},
+    {"0.004", "1", "42_good.json: 'references.cycles.margin_global' is 1, not between"},
+    {"0.004", "-0.1", "42_good.json: 'references.cycles.margin_global' is -0.1"},
+    {"0.03", "'3 %'", "42_good.json: 'references.povray.margin_tile' is not a number"},
+    {"'subgrid': 3", "'subgrid': 65", "'references.povray.subgrid' is 65, not in 1..64"},
+    {"'subgrid': 3", "'spp': 3", "unknown key 'references.povray.spp'"},
+    {"'kind': 'furnace', ", "", "missing key 'references.truth.kind'"},
+    {"'values': {}", "'values': []", "'references.truth.values' is not an object"},
+    {"'kind'", "'replicates': 8, 'kind'", "unknown key 'references.truth.replicates'"},
+    {"+", "'environment': 'a/b.exr'",
      "42_good.json: 'environment' is 'a/b.exr', not a file beside it"},
-    {false, "\"spp\": 16", "\"spp\": 16, \"uses\": \"a.png\"", "'uses' is not a list of files"},
-    {false, "\"spp\": 16", "\"spp\": 16, \"uses\": [\"a/b.png\"]",
-     "'uses' [0] is not a file beside it"},
-    {false, "\"spp\": 16", "\"spp\": 16, \"uses\": [\"none.png\"]", "none.png: No such file"},
-    {false, "\"spp\": 16", "\"spp\": 16, \"environment\": 1", "'environment' is not a text"},
-    {false, "\"spp\": 16", "\"spp\": 16, \"environment\": \"none.exr\"", "none.exr: No such file"},
-    {false, "\"spp\": 16", "\"spp\": 16, \"lens_radius\": 0.1", "missing key 'focal_distance'"},
-    {false, "\"spp\": 16", "\"spp\": 16, \"focal_distance\": 1", "missing key 'lens_radius'"},
-    {false, "\"spp\": 16", "\"spp\": 16, \"lens_radius\": 0, \"focal_distance\": 1",
-     "42_good.json: 'lens_radius' is 0, not between"},
-    {false, "\"spp\": 16", "\"spp\": 16, \"not_expressible\": {\"povray\": \"why\"}",
+    {"+", "'uses': 'a.png'", "'uses' is not a list of files"},
+    {"+", "'uses': ['a/b.png']", "'uses' [0] is not a file beside it"},
+    {"+", "'uses': ['none.png']", "none.png: No such file"},
+    {"+", "'environment': 1", "'environment' is not a text"},
+    {"+", "'environment': 'none.exr'", "none.exr: No such file"},
+    {"+", "'lens_radius': 0.1", "missing key 'focal_distance'"},
+    {"+", "'focal_distance': 1", "missing key 'lens_radius'"},
+    {"+", "'lens_radius': 0, 'focal_distance': 1", "42_good.json: 'lens_radius' is 0, not between"},
+    {"+", "'not_expressible': {'povray': 'why'}",
      "42_good.json: 'povray' is both a reference and not expressible"},
-    {false, "\"spp\": 16", "\"spp\": 16, \"not_expressible\": {\"truth\": \"why\"}",
+    {"+", "'not_expressible': {'truth': 'why'}",
      "42_good.json: unknown key 'not_expressible.truth'"},
-    {false, "\"spp\": 16", "\"spp\": 16, \"variants\": []", "'variants' is not an array of 1 to 8"},
-    {false, "\"spp\": 16", "\"spp\": 16, \"variants\": [{\"name\": \"h\"}]",
-     "missing key 'variants[0].spp'"},
-    {false, "\"spp\": 16",
-     "\"spp\": 16, \"variants\": [{\"name\": \"H\", \"options\": [\"-H\"], \"spp\": 4, "
-     "\"margin_global\": 0.1, \"margin_tile\": 0.1}]",
+    {"+", "'variants': []", "'variants' is not an array of 1 to 8"},
+    {"+", "'variants': [{'name': 'h'}]", "missing key 'variants[0].spp'"},
+    {"+",
+     "'variants': [{'name': 'H', 'options': ['-H'], 'spp': 4, 'margin_global': 0.1, "
+     "'margin_tile': 0.1}]",
      "'variants[0].name' is 'H': only a-z"},
-    {false, "\"spp\": 16",
-     "\"spp\": 16, \"variants\": [{\"name\": \"h\", \"options\": [4], \"spp\": 4, "
-     "\"margin_global\": 0.1, \"margin_tile\": 0.1}]",
+    {"+",
+     "'variants': [{'name': 'h', 'options': [4], 'spp': 4, 'margin_global': 0.1, "
+     "'margin_tile': 0.1}]",
      "'variants[0].options' holds what is not a text"},
-    {false, "\"spp\": 16",
-     "\"spp\": 16, \"consistency\": {\"renders\": 3, \"spp\": 4, \"margin\": 1}",
+    {"+", "'consistency': {'renders': 3, 'spp': 4, 'margin': 1}",
      "'consistency.renders' is 3, not in 4..256"},
-    {false, "\"spp\": 16",
-     "\"spp\": 16, \"consistency\": {\"renders\": 8, \"spp\": 4, \"margin\": 1, "
-     "\"noise_margin\": 0.1}",
+    {"+", "'consistency': {'renders': 8, 'spp': 4, 'margin': 1, 'noise_margin': 0.1}",
      "42_good.json: 'consistency.noise_margin' needs a truth whose noise is known"},
-    {false, "\"spp\": 16",
-     "\"spp\": 16, \"consistency\": {\"renders\": 8, \"spp\": 4, \"margin\": 1, \"parts\": 4}",
+    {"+", "'consistency': {'renders': 8, 'spp': 4, 'margin': 1, 'parts': 4}",
      "'consistency.parts' is 4, not in 1..3"},
-    {false, "\"spp\": 16",
-     "\"spp\": 16, \"consistency\": {\"renders\": 8, \"spp\": 4, \"margin\": 1, "
-     "\"adaptive\": {\"batch\": 1, \"tolerance\": 0.1, \"spp\": 64}}",
+    {"+",
+     "'consistency': {'renders': 8, 'spp': 4, 'margin': 1, 'adaptive': {'batch': 1, "
+     "'tolerance': 0.1, 'spp': 64}}",
      "'consistency.adaptive.batch' is 1, not in 2.."},
-    {true, "\"spp\": 16", "\"spp\": 16, \"not_expressible\": {}", "unknown key 'not_expressible'"},
-    {false, "  }\n}", "  }\n", "42_good.json:14: '}' expected near end of file"},
-    {true, "DIFFERENT", "EQUIVALENT", "93_good.json: 'expect' is 'EQUIVALENT', but scenes of"},
-    {true, ", \"references_of\": \"42_good\"", "", "93_good.json: missing key 'references_of'"},
-    {true, "\"references_of\": \"42_good\"", "\"references\": {}",
-     "93_good.json: unknown key 'references'"},
-    {true, "42_good", "42_best", "93_good.json: 'references_of' names no scene: '42_best'"},
-    {true, "42_good", "93_good", "93_good.json: 'references_of' names '93_good', which has none"},
-    {true, "\"height\": 32", "\"height\": 64", "93_good.json: 64 x 64 pixels, but '42_good' has"},
+    {"  }\n}", "  }\n", "42_good.json:14: '}' expected near end of file"},
+};
+static const struct fault faults_of_9x[] = {
+    {"+", "'not_expressible': {}", "unknown key 'not_expressible'"},
+    {"DIFFERENT", "EQUIVALENT", "93_good.json: 'expect' is 'EQUIVALENT', but scenes of"},
+    {", 'references_of': '42_good'", "", "93_good.json: missing key 'references_of'"},
+    {"'references_of': '42_good'", "'references': {}", "93_good.json: unknown key 'references'"},
+    {"42_good", "42_best", "93_good.json: 'references_of' names no scene: '42_best'"},
+    {"42_good", "93_good", "93_good.json: 'references_of' names '93_good', which has none"},
+    {"'height': 32", "'height': 64", "93_good.json: 64 x 64 pixels, but '42_good' has"},
 };
 
-/* `text` with the first `from` replaced; the caller frees. */
+/* `text` so edited; the caller frees. */
 static char *edited(const char *text, const char *from, const char *to)
 {
-    const char *at = strstr(text, from);
+    const bool adds = strcmp(from, "+") == 0;
+    const char *at = strstr(text, adds ? "'expect'" : from);
     assert_non_null(at);
-    size_t size = strlen(text) + strlen(to) + 1;
+    size_t size = strlen(text) + strlen(to) + 3;
     char *out = malloc(size);
     assert_non_null(out);
-    snprintf(out, size, "%.*s%s%s", (int)(at - text), text, to, at + strlen(from));
+    snprintf(out, size, "%.*s%s%s%s", (int)(at - text), text, to, adds ? ", " : "",
+             at + (adds ? 0 : strlen(from)));
     return out;
+}
+
+static void expect_faults(const char *dir, const char *name, const char *text,
+                          const struct fault *f, size_t num)
+{
+    struct suite s;
+    struct err e;
+    for (size_t i = 0; i < num; i++) {
+        char *wrong = edited(text, f[i].from, f[i].to);
+        put(dir, name, wrong);
+        free(wrong);
+        if (suite_load(test_path(dir), &s, &e))
+            fail_msg("accepted, wanted: %s", f[i].message);
+        assert_ptr_equal(strstr(e.msg, test_path(dir)), e.msg);
+        if (strstr(e.msg, f[i].message) == NULL || strchr(e.msg, '\n') != NULL)
+            fail_msg("no '%s' in: %s", f[i].message, e.msg);
+    }
+    put(dir, name, text);
 }
 
 TEST(faults_are_named)
 {
-    char dir[64];
-    make_dir(dir);
+    const char *dir = make_dir("faults");
     struct suite s;
     struct err e;
     put(dir, "42_good.dae", "geometry");
@@ -422,27 +418,12 @@ TEST(faults_are_named)
     put(dir, "93_good.json", good_9x);
     put(dir, "README.md", "ignored");
     put(dir, ".hidden.json", "ignored");
-    MUST(suite_load(dir, &s, &e));
+    MUST(suite_load(test_path(dir), &s, &e));
     assert_int_equal(s.num_scenes, 2);
     assert_int_equal(s.scene[1].num_references, 3);
     suite_free(&s);
-
-    for (size_t i = 0; i < COUNT(faults); i++) {
-        const struct fault *f = &faults[i];
-        char *text = edited(f->in_9x ? good_9x : good, f->from, f->to);
-        put(dir, "42_good.json", f->in_9x ? good : text);
-        put(dir, "93_good.json", f->in_9x ? text : good_9x);
-        free(text);
-        if (suite_load(dir, &s, &e)) {
-            suite_free(&s);
-            fail_msg("row %zu accepted, wanted: %s", i, f->message);
-        }
-        assert_ptr_equal(strstr(e.msg, dir), e.msg);
-        if (strstr(e.msg, f->message) == NULL)
-            fail_msg("row %zu: no '%s' in: %s", i, f->message, e.msg);
-        assert_null(strchr(e.msg, '\n'));
-    }
-    drop_dir(dir);
+    expect_faults(dir, "42_good.json", good, faults, COUNT(faults));
+    expect_faults(dir, "93_good.json", good_9x, faults_of_9x, COUNT(faults_of_9x));
 }
 
 /* One directory after the other: its files, and what must be said of it. */
@@ -466,42 +447,29 @@ static const struct listing {
 /* A copy of 12_point_plane with a lens and an environment of radiance 1 2 3. */
 TEST(environment_and_lens_are_opened)
 {
-    char dir[64], path[128], plain[65];
+    const char *dir = make_dir("lens");
+    char plain[65], *dae = test_read("reference/scenes/12_point_plane.dae");
     struct err e;
-    make_dir(dir);
-    snprintf(path, sizeof path, "%s/42_good.dae", dir);
-    struct out_file copy;
-    FILE *in = fopen("reference/scenes/12_point_plane.dae", "rb");
-    assert_non_null(in);
-    assert_true(out_open(&copy, path, &e));
-    for (int c; (c = getc(in)) != EOF;)
-        putc(c, copy.f);
-    fclose(in);
-    assert_true(out_commit(&copy, &e));
+    test_write_text(test_path("lens/42_good.dae"), dae);
+    free(dae);
     put(dir, "42_good.json", good);
     struct suite s;
-    assert_true(suite_load(dir, &s, &e));
+    MUST(suite_load(test_path(dir), &s, &e));
     memcpy(plain, s.scene[0].sha256, sizeof plain);
     suite_free(&s);
 
-    float texels[3 * 8];
+    struct image sky = build_image(4, 2);
     for (int i = 0; i < 3 * 8; i++)
-        texels[i] = (float)(1 + i % 3);
-    struct image sky = {0};
-    assert_true(image_alloc(&sky, 4, 2, 3, (const char *const[]){"R", "G", "B"}, &e));
-    memcpy(sky.data, texels, sizeof texels);
-    snprintf(path, sizeof path, "%s/sky.exr", dir);
-    assert_true(image_write_exr(path, &sky, &e));
+        sky.data[i] = (float)(1 + i % 3);
+    MUST(image_write_exr(test_path("lens/sky.exr"), &sky, &e));
     image_free(&sky);
-    char *text = edited(good, "\"spp\": 16",
-                        "\"spp\": 16, \"environment\": \"sky.exr\", \"lens_radius\": 0.25, "
-                        "\"focal_distance\": 2.5");
+    char *text =
+        edited(good, "+", "'environment': 'sky.exr', 'lens_radius': 0.25, 'focal_distance': 2.5");
     put(dir, "42_good.json", text);
     free(text);
     struct scene scene;
     struct camera camera;
-    if (!suite_load(dir, &s, &e) || !suite_open(&s.scene[0], &scene, &camera, &e))
-        fail_msg("%s", e.msg);
+    MUST(suite_load(test_path(dir), &s, &e) && suite_open(&s.scene[0], &scene, &camera, &e));
     assert_true(camera.lens_radius == 0.25f && camera.focal_distance == 2.5f);
     assert_int_equal(camera.width, 64);
     rgb up = environment_radiance(scene.environment, (vec3){0, 1, 0});
@@ -509,7 +477,6 @@ TEST(environment_and_lens_are_opened)
     assert_string_not_equal(s.scene[0].sha256, plain);
     scene_free(&scene);
     suite_free(&s);
-    drop_dir(dir);
 }
 
 TEST(wrong_directories_are_named)
@@ -519,13 +486,11 @@ TEST(wrong_directories_are_named)
     assert_false(suite_load("tests/no such directory", &s, &e));
     assert_string_equal(e.msg, "tests/no such directory: No such file or directory");
     for (size_t i = 0; i < COUNT(listings); i++) {
-        char dir[64];
+        char dir[16];
+        snprintf(dir, sizeof dir, "listing_%zu", i);
         make_dir(dir);
         for (size_t j = 0; j < COUNT(listings[i].files) && listings[i].files[j] != NULL; j++)
             put(dir, listings[i].files[j], good);
-        bool ok = suite_load(dir, &s, &e);
-        drop_dir(dir);
-        if (ok || strstr(e.msg, listings[i].message) == NULL)
-            fail_msg("row %zu: %s", i, ok ? "accepted" : e.msg);
+        REFUSES(suite_load(test_path(dir), &s, &e), listings[i].message);
     }
 }

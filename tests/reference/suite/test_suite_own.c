@@ -5,20 +5,20 @@
 #include "renderer/base/fs.h"
 
 static const char good[] =
-    "{\"version\": 1, \"engine\": \"mine.json\", \"margin\": 0.01,\n"
-    " \"references\": {\"mine-1.4\": {\"spp\": 64}},\n"
-    " \"scenes\": {\n"
-    "  \"room\": {\"file\": \"room.xml\", \"uses\": [\"wood.png\"], \"width\": 64, \"height\": 32},\n"
-    "  \"ball\": {\"file\": \"ball.dae\", \"width\": 64, \"height\": 32, \"depth\": 1, \"margin\": 0.3,\n"
-    "           \"references\": {\"mine-1.4\": {\"replicates\": 128, \"margin_tile\": 0.5},\n"
-    "                          \"povray\": {\"replicates\": 8, \"subgrid\": 2}}},\n"
-    "  \"dark\": {\"file\": \"ball.dae\", \"width\": 64, \"height\": 32, \"expect\": \"DIFFERENT\",\n"
-    "           \"references_of\": \"ball\"}\n"
+    "{'version': 1, 'engine': 'mine.json', 'margin': 0.01,\n"
+    " 'references': {'mine-1.4': {'spp': 64}},\n"
+    " 'scenes': {\n"
+    "  'room': {'file': 'room.xml', 'uses': ['wood.png'], 'width': 64, 'height': 32},\n"
+    "  'ball': {'file': 'ball.dae', 'width': 64, 'height': 32, 'depth': 1, 'margin': 0.3,\n"
+    "           'references': {'mine-1.4': {'replicates': 128, 'margin_tile': 0.5},\n"
+    "                          'povray': {'replicates': 8, 'subgrid': 2}}},\n"
+    "  'dark': {'file': 'ball.dae', 'width': 64, 'height': 32, 'expect': 'DIFFERENT',\n"
+    "           'references_of': 'ball'}\n"
     " }}\n";
 
 static void put(const char *name, const char *text)
 {
-    test_write(test_path(name), text, strlen(text));
+    test_write_text(test_path(name), text);
 }
 
 static void put_files(const char *suite)
@@ -26,7 +26,7 @@ static void put_files(const char *suite)
     static const char *const names[] = {"mine.json", "room.xml", "wood.png", "ball.dae"};
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         put(names[i], names[i]);
-    put("suite.json", suite);
+    test_write_json(test_path("suite.json"), suite);
 }
 
 TEST(a_suite_of_ones_own_is_read)
@@ -83,42 +83,40 @@ TEST(files_that_a_scene_uses_are_in_its_hash)
 static const struct fault {
     const char *from, *to, *message;
 } faults[] = {
-    {"\"version\": 1", "\"version\": 2", "suite.json: 'version' is 2, not in 1..1"},
-    {"\"version\"", "\"verison\"", "suite.json: unknown key 'verison'"},
+    {"'version': 1", "'version': 2", "suite.json: 'version' is 2, not in 1..1"},
+    {"'version'", "'verison'", "suite.json: unknown key 'verison'"},
     {"}}\n", "}\n", "suite.json:11: '}' expected near end of file"},
-    {"\"room\"", "\"ball\"", "suite.json:5: duplicate object key"},
-    {"\"mine.json\"", "\"gone.json\"", "gone.json', which cannot be read"},
-    {"\"mine.json\"", "7", "suite.json: 'engine' is not a text"},
-    {"\"margin\": 0.01", "\"margin\": 1", "suite.json: 'margin' is 1, not between 0 and 1"},
-    {"\"margin\": 0.01,", "",
+    {"'room'", "'ball'", "suite.json:5: duplicate object key"},
+    {"'mine.json'", "'gone.json'", "gone.json', which cannot be read"},
+    {"'mine.json'", "7", "suite.json: 'engine' is not a text"},
+    {"'margin': 0.01", "'margin': 1", "suite.json: 'margin' is 1, not between 0 and 1"},
+    {"'margin': 0.01,", "",
      "suite.json: 'scenes.room.references.mine-1.4.margin' is given neither"},
-    {"\"references\": {\"mine-1.4\"", "\"references\": {\"mine 1.4\"",
+    {"'references': {'mine-1.4'", "'references': {'mine 1.4'",
      "suite.json: 'scenes.room.references.mine 1.4' is no name of a reference"},
-    {"{\"spp\": 64}", "7", "suite.json: 'scenes.room.references.mine-1.4' is not an object"},
-    {"{\"spp\": 64}", "null", "suite.json: 'scenes.room.references' is empty"},
-    {"{\"spp\": 64}", "{\"spp\": 0}",
-     "suite.json: 'scenes.room.references.mine-1.4.spp' is 0, not in"},
-    {"{\"spp\": 64}", "{\"ssp\": 64}",
-     "suite.json: unknown key 'scenes.room.references.mine-1.4.ssp'"},
-    {"{\"spp\": 64}", "{\"class\": \"good\"}", "references.mine-1.4.class' is 'good', not 'exact'"},
-    {"{\"mine-1.4\": {\"spp\": 64}}", "[]", "suite.json: 'references' is not an object"},
-    {"\"room\"", "\".room\"", "suite.json: 'scenes..room' is no name of a scene"},
-    {"\"room\"", "\"a/b\"", "suite.json: 'scenes.a/b' is no name of a scene"},
-    {"\"file\": \"room.xml\"", "\"file\": \"gone.xml\"", "suite.json: 'scenes.room.file' is '"},
-    {"\"file\": \"room.xml\", ", "", "suite.json: missing key 'scenes.room.file'"},
-    {"[\"wood.png\"]", "\"wood.png\"", "suite.json: 'scenes.room.uses' is not a list of files"},
-    {"\"wood.png\"", "7", "suite.json: 'scenes.room.uses' [0] is not a text"},
-    {"\"wood.png\"", "\"gone.png\"", "gone.png: No such file"},
-    {"\"width\": 64, \"height\": 32}", "\"height\": 32}", "missing key 'scenes.room.width'"},
-    {"\"depth\": 1", "\"depth\": 101", "suite.json: 'scenes.ball.depth' is 101, not in 0..100"},
-    {"\"depth\": 1", "\"tiles\": 1", "suite.json: unknown key 'scenes.ball.tiles'"},
-    {"[\"wood.png\"]", "[], \"lens_radius\": 1",
-     "'scenes.room.lens_radius' is for scenes in COLLADA"},
-    {"\"subgrid\": 2", "\"spp\": 2", "unknown key 'scenes.ball.references.povray.spp'"},
-    {"\"DIFFERENT\"", "\"INCONCLUSIVE\"", "'scenes.dark.expect' is 'INCONCLUSIVE', not"},
-    {"\"references_of\": \"ball\"", "\"references_of\": \"bell\"",
+    {"{'spp': 64}", "7", "suite.json: 'scenes.room.references.mine-1.4' is not an object"},
+    {"{'spp': 64}", "null", "suite.json: 'scenes.room.references' is empty"},
+    {"{'spp': 64}", "{'spp': 0}", "suite.json: 'scenes.room.references.mine-1.4.spp' is 0, not in"},
+    {"{'spp': 64}", "{'ssp': 64}", "suite.json: unknown key 'scenes.room.references.mine-1.4.ssp'"},
+    {"{'spp': 64}", "{'class': 'good'}", "references.mine-1.4.class' is 'good', not 'exact'"},
+    {"{'mine-1.4': {'spp': 64}}", "[]", "suite.json: 'references' is not an object"},
+    {"'room'", "'.room'", "suite.json: 'scenes..room' is no name of a scene"},
+    {"'room'", "'a/b'", "suite.json: 'scenes.a/b' is no name of a scene"},
+    {"'file': 'room.xml'", "'file': 'gone.xml'", "suite.json: 'scenes.room.file' is '"},
+    {"'file': 'room.xml', ", "", "suite.json: missing key 'scenes.room.file'"},
+    {"['wood.png']", "'wood.png'", "suite.json: 'scenes.room.uses' is not a list of files"},
+    {"'wood.png'", "7", "suite.json: 'scenes.room.uses' [0] is not a text"},
+    {"'wood.png'", "'gone.png'", "gone.png: No such file"},
+    {"'width': 64, 'height': 32}", "'height': 32}", "missing key 'scenes.room.width'"},
+    {"'depth': 1", "'depth': 101", "suite.json: 'scenes.ball.depth' is 101, not in 0..100"},
+    {"'depth': 1", "'tiles': 1", "suite.json: unknown key 'scenes.ball.tiles'"},
+    {"['wood.png']", "[], 'lens_radius': 1", "'scenes.room.lens_radius' is for scenes in COLLADA"},
+    {"'subgrid': 2", "'spp': 2", "unknown key 'scenes.ball.references.povray.spp'"},
+    {"'DIFFERENT'", "'INCONCLUSIVE'", "'scenes.dark.expect' is 'INCONCLUSIVE', not"},
+    {"'references_of': 'ball'", "'references_of': 'bell'",
      "suite.json: scenes.dark: 'references_of' names no scene: 'bell'"},
-    {"\"references_of\": \"ball\"", "\"references_of\": \"dark\"", "suite.json: 'scenes.dark.references' is empty"},
+    {"'references_of': 'ball'", "'references_of': 'dark'",
+     "suite.json: 'scenes.dark.references' is empty"},
 };
 
 TEST(mistakes_are_named_with_their_place)

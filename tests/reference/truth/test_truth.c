@@ -308,49 +308,44 @@ TEST(images_are_the_right_way_round)
     }
 }
 
-#define POINT_REST "\"albedo\":[0.5,0.5,0.5],\"footprint\":{\"x\":[-1,1],\"z\":[-1,1]}"
-#define RECT_REST                                                                                  \
-    "\"radiance\":[1,1,1],\"albedo\":[0.5,0.5,0.5],\"footprint\":{\"x\":[-1,1],\"z\":[-1,1]}"
+#define POINT_REST "'albedo':[0.5,0.5,0.5],'footprint':{'x':[-1,1],'z':[-1,1]}"
+#define RECT_REST  "'radiance':[1,1,1],'albedo':[0.5,0.5,0.5],'footprint':{'x':[-1,1],'z':[-1,1]}"
 
 static const struct bad {
     const char *kind, *values;
     int depth;
     const char *message; /* a part of it; NULL: must be accepted */
 } bad[] = {
-    {"furnace", "{\"emission\":[1,1,1],\"albedo\":[0,0.5,1]}", 0, NULL},
-    {"furnace", "{\"emission\":[1,1,1]}", 1, "albedo"},
-    {"furnace", "{\"emission\":[1,1,1],\"albedo\":[0,0,0],\"extra\":1}", 1, "extra"},
-    {"furnace", "{\"emission\":[1,1],\"albedo\":[0,0,0]}", 1, "2"},
-    {"furnace", "{\"emission\":[1,1,1,1],\"albedo\":[0,0,0]}", 1, "left unpacked"},
-    {"furnace", "{\"emission\":[1,1,\"1\"],\"albedo\":[0,0,0]}", 1, "string"},
-    {"furnace", "{\"emission\":[1,1,1],\"albedo\":[0,0,1.01]}", 1, "albedo[2] is 1.01"},
-    {"furnace", "{\"emission\":[1,-1,1],\"albedo\":[0,0,0]}", 1, "emission[1] is -1"},
+    {"furnace", "{'emission':[1,1,1],'albedo':[0,0.5,1]}", 0, NULL},
+    {"furnace", "{'emission':[1,1,1]}", 1, "albedo"},
+    {"furnace", "{'emission':[1,1,1],'albedo':[0,0,0],'extra':1}", 1, "extra"},
+    {"furnace", "{'emission':[1,1],'albedo':[0,0,0]}", 1, "2"},
+    {"furnace", "{'emission':[1,1,1,1],'albedo':[0,0,0]}", 1, "left unpacked"},
+    {"furnace", "{'emission':[1,1,'1'],'albedo':[0,0,0]}", 1, "string"},
+    {"furnace", "{'emission':[1,1,1],'albedo':[0,0,1.01]}", 1, "albedo[2] is 1.01"},
+    {"furnace", "{'emission':[1,-1,1],'albedo':[0,0,0]}", 1, "emission[1] is -1"},
     {"lambda", "{}", 1, "truth 'lambda': unknown closed form"},
-    {"point_over_plane", "{\"intensity\":[1,1,1],\"light\":[0,1,0]," POINT_REST "}", 1, NULL},
-    {"point_over_plane", "{\"intensity\":[1,1,1],\"light\":[0,1,0]," POINT_REST "}", 7, NULL},
-    {"point_over_plane", "{\"intensity\":[1,1,1],\"light\":[0,1,0]," POINT_REST "}", 0,
-     "depth is 0"},
-    {"point_over_plane", "{\"intensity\":[1,1,1],\"light\":[0,0,0]," POINT_REST "}", 1,
+    {"point_over_plane", "{'intensity':[1,1,1],'light':[0,1,0]," POINT_REST "}", 1, NULL},
+    {"point_over_plane", "{'intensity':[1,1,1],'light':[0,1,0]," POINT_REST "}", 7, NULL},
+    {"point_over_plane", "{'intensity':[1,1,1],'light':[0,1,0]," POINT_REST "}", 0, "depth is 0"},
+    {"point_over_plane", "{'intensity':[1,1,1],'light':[0,0,0]," POINT_REST "}", 1,
      "not above the plane"},
-    {"point_over_plane", "{\"intensity\":[1,1,-1],\"light\":[0,1,0]," POINT_REST "}", 1,
+    {"point_over_plane", "{'intensity':[1,1,-1],'light':[0,1,0]," POINT_REST "}", 1,
      "intensity[2]"},
     {"point_over_plane",
-     "{\"intensity\":[1,1,1],\"light\":[0,1,0],\"albedo\":[0.5,0.5,0.5],"
-     "\"footprint\":{\"x\":[1,1],\"z\":[-1,1]}}",
+     "{'intensity':[1,1,1],'light':[0,1,0],'albedo':[0.5,0.5,0.5],"
+     "'footprint':{'x':[1,1],'z':[-1,1]}}",
      1, "footprint has no area"},
-    {"point_over_plane", "{\"intensity\":[1,1,1],\"light\":[0,1e-3,0]," POINT_REST "}", 1,
+    {"point_over_plane", "{'intensity':[1,1,1],'light':[0,1e-3,0]," POINT_REST "}", 1,
      "not converged"},
-    {"rectangle_over_plane", "{\"height\":1,\"emitter\":{\"x\":[0,1],\"z\":[0,1]}," RECT_REST "}",
-     1, NULL},
-    {"rectangle_over_plane", "{\"height\":-1,\"emitter\":{\"x\":[0,1],\"z\":[0,1]}," RECT_REST "}",
-     1, "not above the plane"},
-    {"rectangle_over_plane", "{\"height\":1,\"emitter\":{\"x\":[1,0],\"z\":[0,1]}," RECT_REST "}",
-     1, "emitter has no area"},
-    {"rectangle_over_plane", "{\"height\":1,\"emitter\":{\"x\":[0,1],\"y\":[0,1]}," RECT_REST "}",
-     1, "z"},
+    {"rectangle_over_plane", "{'height':1,'emitter':{'x':[0,1],'z':[0,1]}," RECT_REST "}", 1, NULL},
+    {"rectangle_over_plane", "{'height':-1,'emitter':{'x':[0,1],'z':[0,1]}," RECT_REST "}", 1,
+     "not above the plane"},
+    {"rectangle_over_plane", "{'height':1,'emitter':{'x':[1,0],'z':[0,1]}," RECT_REST "}", 1,
+     "emitter has no area"},
+    {"rectangle_over_plane", "{'height':1,'emitter':{'x':[0,1],'y':[0,1]}," RECT_REST "}", 1, "z"},
     {"rectangle_over_plane",
-     "{\"height\":1e-4,\"emitter\":{\"x\":[0.1,0.2],\"z\":[0.1,0.2]}," RECT_REST "}", 1,
-     "not converged"},
+     "{'height':1e-4,'emitter':{'x':[0.1,0.2],'z':[0.1,0.2]}," RECT_REST "}", 1, "not converged"},
 };
 
 TEST(impossible_values_are_refused)

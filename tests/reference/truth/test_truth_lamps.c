@@ -540,32 +540,32 @@ TEST(pyramid_pixels_match_rays)
     moments_free(&m);
 }
 
-#define FOOT   "\"footprint\":{\"x\":[-1,1],\"z\":[-1,1]}"
-#define SPOT   "{\"intensity\":[1,1,1],\"albedo\":[1,1,1],\"light\":[0,1,0],\"axis\":[0,-1,0]," FOOT
-#define BALL   "{\"radiance\":[1,1,1],\"albedo\":[1,1,1],\"centre\":[0,1,0]," FOOT
-#define SUN    "{\"irradiance\":[1,1,1],\"albedo\":[1,1,1],\"centre\":[0.5,0.5],\"apex\":[0,0,0],"
-#define RIDGES "\"ridges\":[[1,-1,0],[0,-1,1],[-1,-1,0],[0,-1,-1]]"
+#define FOOT   "'footprint':{'x':[-1,1],'z':[-1,1]}"
+#define SPOT   "{'intensity':[1,1,1],'albedo':[1,1,1],'light':[0,1,0],'axis':[0,-1,0]," FOOT
+#define BALL   "{'radiance':[1,1,1],'albedo':[1,1,1],'centre':[0,1,0]," FOOT
+#define SUN    "{'irradiance':[1,1,1],'albedo':[1,1,1],'centre':[0.5,0.5],'apex':[0,0,0],"
+#define RIDGES "'ridges':[[1,-1,0],[0,-1,1],[-1,-1,0],[0,-1,-1]]"
 
 TEST(impossible_values_are_refused)
 {
-    expect_refusal("spot_over_plane", SPOT ",\"exponent\":1,\"cutoff\":45}", 1, NULL);
-    expect_refusal("spot_over_plane", SPOT ",\"exponent\":1,\"cutoff\":45}", 0, "depth is 0");
-    expect_refusal("spot_over_plane", SPOT ",\"exponent\":-1,\"cutoff\":45}", 1, "exponent is -1");
-    expect_refusal("spot_over_plane", SPOT ",\"exponent\":1,\"cutoff\":90}", 1, "cutoff is 90");
-    expect_refusal("spot_over_plane", SPOT ",\"exponent\":1}", 1, "cutoff");
+    expect_refusal("spot_over_plane", SPOT ",'exponent':1,'cutoff':45}", 1, NULL);
+    expect_refusal("spot_over_plane", SPOT ",'exponent':1,'cutoff':45}", 0, "depth is 0");
+    expect_refusal("spot_over_plane", SPOT ",'exponent':-1,'cutoff':45}", 1, "exponent is -1");
+    expect_refusal("spot_over_plane", SPOT ",'exponent':1,'cutoff':90}", 1, "cutoff is 90");
+    expect_refusal("spot_over_plane", SPOT ",'exponent':1}", 1, "cutoff");
     expect_refusal("spot_over_plane",
-                   "{\"intensity\":[1,1,1],\"albedo\":[1,1,1],\"light\":[0,1,0],\"axis\":[1,-1,0],"
-                   "\"exponent\":1,\"cutoff\":50," FOOT "}",
+                   "{'intensity':[1,1,1],'albedo':[1,1,1],'light':[0,1,0],'axis':[1,-1,0],"
+                   "'exponent':1,'cutoff':50," FOOT "}",
                    1, "does not end on the plane");
-    expect_refusal("sphere_over_plane", BALL ",\"radius\":0.9}", 1, NULL);
-    expect_refusal("sphere_over_plane", BALL ",\"radius\":1}", 1, "radius is 1");
-    expect_refusal("sphere_over_plane", BALL ",\"radius\":0}", 1, "radius is 0");
-    expect_refusal("sphere_over_plane", BALL ",\"radius\":0.9}", 0, "depth is 0");
-    expect_refusal("sun_on_pyramid", SUN RIDGES ",\"to_light\":[0,1,0]}", 1, NULL);
-    expect_refusal("sun_on_pyramid", SUN RIDGES ",\"to_light\":[0,1,0]}", 0, "depth is 0");
-    expect_refusal("sun_on_pyramid", SUN RIDGES ",\"to_light\":[3,1,0]}", 1, "does not face");
+    expect_refusal("sphere_over_plane", BALL ",'radius':0.9}", 1, NULL);
+    expect_refusal("sphere_over_plane", BALL ",'radius':1}", 1, "radius is 1");
+    expect_refusal("sphere_over_plane", BALL ",'radius':0}", 1, "radius is 0");
+    expect_refusal("sphere_over_plane", BALL ",'radius':0.9}", 0, "depth is 0");
+    expect_refusal("sun_on_pyramid", SUN RIDGES ",'to_light':[0,1,0]}", 1, NULL);
+    expect_refusal("sun_on_pyramid", SUN RIDGES ",'to_light':[0,1,0]}", 0, "depth is 0");
+    expect_refusal("sun_on_pyramid", SUN RIDGES ",'to_light':[3,1,0]}", 1, "does not face");
     expect_refusal("sun_on_pyramid",
-                   SUN "\"to_light\":[0,1,0],\"ridges\":[[1,-1,0],[0,1,1],[-1,-1,0],[0,1,-1]]}", 1,
+                   SUN "'to_light':[0,1,0],'ridges':[[1,-1,0],[0,1,1],[-1,-1,0],[0,1,-1]]}", 1,
                    "not convex");
-    expect_refusal("sun_on_pyramid", SUN "\"to_light\":[0,1,0],\"ridges\":[[1,-1,0]]}", 1, "1");
+    expect_refusal("sun_on_pyramid", SUN "'to_light':[0,1,0],'ridges':[[1,-1,0]]}", 1, "1");
 }

@@ -180,9 +180,9 @@ TEST(panels_are_where_they_belong)
 }
 
 #define PANEL(distance, normal, offset)                                                            \
-    "{\"radiance\":[1,1,1],\"distance\":" distance ",\"normal\":" normal ",\"offset\":" offset "}"
+    "{'radiance':[1,1,1],'distance':" distance ",'normal':" normal ",'offset':" offset "}"
 #define SCENE(panels)                                                                              \
-    "{\"background\":[1,1,1],\"footprint\":{\"x\":[-1,1],\"y\":[1,-1]},\"panels\":[" panels "]}"
+    "{'background':[1,1,1],'footprint':{'x':[-1,1],'y':[1,-1]},'panels':[" panels "]}"
 
 TEST(impossible_values_are_refused)
 {

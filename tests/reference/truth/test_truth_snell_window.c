@@ -168,20 +168,20 @@ TEST(three_lamps_both_ways)
 TEST(impossible_values_are_refused)
 {
 #define LAMPS(lamps)                                                                               \
-    "{\"albedo\": [0.5, 0.5, 0.5], \"footprint\": {\"x\": [0, 1], \"z\": [0, 1]}, \"lamps\": "     \
+    "{'albedo': [0.5, 0.5, 0.5], 'footprint': {'x': [0, 1], 'z': [0, 1]}, 'lamps': "               \
     "[" lamps "]}"
-    static const char point[] = LAMPS("{\"intensity\": [1, 1, 1], \"light\": [0, 1, 0]}");
+    static const char point[] = LAMPS("{'intensity': [1, 1, 1], 'light': [0, 1, 0]}");
     expect_refusal("lamps_over_plane", point, 1, NULL);
     expect_refusal("lamps_over_plane", point, 0, "direct light");
     expect_refusal("lamps_over_plane", LAMPS(""), 1, "not an array of 1 to 8");
-    expect_refusal("lamps_over_plane", LAMPS("{\"intensity\": [1, 1, 1], \"light\": [0, -1, 0]}"),
-                   1, "lamps[0]: light is at height -1");
+    expect_refusal("lamps_over_plane", LAMPS("{'intensity': [1, 1, 1], 'light': [0, -1, 0]}"), 1,
+                   "lamps[0]: light is at height -1");
     expect_refusal("lamps_over_plane",
-                   LAMPS("{\"radiance\": [1, 1, 1], \"height\": 1, \"x\": [1, 0], \"z\": [0, 1]}"),
-                   1, "no area");
+                   LAMPS("{'radiance': [1, 1, 1], 'height': 1, 'x': [1, 0], 'z': [0, 1]}"), 1,
+                   "no area");
 #define WINDOW(eye, forward, ior)                                                                  \
-    "{\"view\": {\"eye\": " eye ", \"right\": [1, 0, 0], \"up\": [0, 0, 1], \"forward\": " forward \
-    ", \"tan_half\": 1.2}, \"ior\": " ior ", \"sky\": [1, 1, 1], \"floor\": [1, 1, 1]}"
+    "{'view': {'eye': " eye ", 'right': [1, 0, 0], 'up': [0, 0, 1], 'forward': " forward           \
+    ", 'tan_half': 1.2}, 'ior': " ior ", 'sky': [1, 1, 1], 'floor': [1, 1, 1]}"
     expect_refusal("snell_window", WINDOW("[0, -1, 0]", "[0, 1, 0]", "1.5"), 1, NULL);
     expect_refusal("snell_window", WINDOW("[0, -1, 0]", "[0, 1, 0]", "1.5"), 0, "one bounce");
     expect_refusal("snell_window", WINDOW("[0, 1, 0]", "[0, 1, 0]", "1.5"), 1, "not below");

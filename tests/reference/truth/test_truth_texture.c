@@ -108,25 +108,23 @@ TEST(pixels_are_means_of_the_texture)
 TEST(bad_values_are_refused)
 {
 #define BOARD(place, uv, wrap, factor)                                                             \
-    "{\"width\": 1, \"rows\": [[1, 2, 3]], \"boards\": [{\"place\": " place ", \"uv\": " uv        \
-    ", \"wrap\": " wrap ", \"nearest\": true, \"factor\": " factor "}]}"
-    static const char *const good =
-        BOARD("[0,0,1,1]", "[0,0,1,1]", "[\"WRAP\",\"CLAMP\"]", "[1,1,1]");
+    "{'width': 1, 'rows': [[1, 2, 3]], 'boards': [{'place': " place ", 'uv': " uv                  \
+    ", 'wrap': " wrap ", 'nearest': true, 'factor': " factor "}]}"
+    static const char *const good = BOARD("[0,0,1,1]", "[0,0,1,1]", "['WRAP','CLAMP']", "[1,1,1]");
     static const struct {
         const char *values, *says;
     } cases[] = {
-        {BOARD("[0,0,1,2]", "[0,0,1,1]", "[\"WRAP\",\"CLAMP\"]", "[1,1,1]"),
+        {BOARD("[0,0,1,2]", "[0,0,1,1]", "['WRAP','CLAMP']", "[1,1,1]"),
          "place or uv out of range"},
-        {BOARD("[0,0,0,1]", "[0,0,1,1]", "[\"WRAP\",\"CLAMP\"]", "[1,1,1]"), "without an extent"},
-        {BOARD("[0,0,1,1]", "[0,1,1,1]", "[\"WRAP\",\"CLAMP\"]", "[1,1,1]"), "without an extent"},
-        {BOARD("[0,0,1,1]", "[0,0,9,1]", "[\"WRAP\",\"CLAMP\"]", "[1,1,1]"),
+        {BOARD("[0,0,0,1]", "[0,0,1,1]", "['WRAP','CLAMP']", "[1,1,1]"), "without an extent"},
+        {BOARD("[0,0,1,1]", "[0,1,1,1]", "['WRAP','CLAMP']", "[1,1,1]"), "without an extent"},
+        {BOARD("[0,0,1,1]", "[0,0,9,1]", "['WRAP','CLAMP']", "[1,1,1]"),
          "place or uv out of range"},
-        {BOARD("[0,0,1,1]", "[0,0,1,1]", "[\"WRAP\",\"REPEAT\"]", "[1,1,1]"),
-         "unknown wrap 'REPEAT'"},
-        {BOARD("[0,0,1,1]", "[0,0,1,1]", "[\"WRAP\",\"CLAMP\"]", "[1,-1,1]"), "factor[1]"},
-        {"{\"width\": 2, \"rows\": [[1, 2, 3]], \"boards\": []}", "rows[0] has 3 numbers, not 6"},
-        {"{\"width\": 1, \"rows\": [[1, 2, 256]], \"boards\": []}", "rows[0][2] is 256"},
-        {"{\"width\": 1, \"rows\": [], \"boards\": []}", "1 x 0 texels"},
+        {BOARD("[0,0,1,1]", "[0,0,1,1]", "['WRAP','REPEAT']", "[1,1,1]"), "unknown wrap 'REPEAT'"},
+        {BOARD("[0,0,1,1]", "[0,0,1,1]", "['WRAP','CLAMP']", "[1,-1,1]"), "factor[1]"},
+        {"{'width': 2, 'rows': [[1, 2, 3]], 'boards': []}", "rows[0] has 3 numbers, not 6"},
+        {"{'width': 1, 'rows': [[1, 2, 256]], 'boards': []}", "rows[0][2] is 256"},
+        {"{'width': 1, 'rows': [], 'boards': []}", "1 x 0 texels"},
     };
 #undef BOARD
     expect_refusal("pictures", good, 1, NULL);
