@@ -209,17 +209,25 @@ static float linear_of(float stored, double power)
     return (float)(c <= 0.04045 ? c / 12.92 : pow((c + 0.055) / 1.055, 2.4));
 }
 
-static bool take_colours(struct image *im, double power, struct image *out, struct err *e)
+/* Of 8 bits there are 256 numbers, each with a power that takes longer than all the rest. */
+static bool take_colours(struct image *im, const struct image_info *info, struct image *out,
+                         struct err *e)
 {
     int which[3];
+    float linear[256];
+    const bool bytes = info->type == IMAGE_INT8;
     if (!colour_channels(im, which))
         return err_set(e, "no channels R, G and B");
     if (!image_alloc(out, im->width, im->height, 3, (const char *const[]){"R", "G", "B"}, e))
         return false;
+    for (int k = 0; k < 256; k++)
+        linear[k] = linear_of((float)k * (1.0F / 255), info->power);
     for (size_t i = 0; i < (size_t)im->width * (size_t)im->height; i++)
-        for (int c = 0; c < 3; c++)
+        for (int c = 0; c < 3; c++) {
+            float v = im->data[i * (size_t)im->channels + (size_t)which[c]];
             out->data[3 * i + (size_t)c] =
-                linear_of(im->data[i * (size_t)im->channels + (size_t)which[c]], power);
+                bytes ? linear[(int)(255 * v + 0.5F)] : linear_of(v, info->power);
+        }
     return true;
 }
 
@@ -231,7 +239,7 @@ bool image_read_colours(const char *path, struct image *out, struct err *e)
     struct library_image *p = open_image(path, FOR_COLOURS, &library, &info, e);
     if (p == NULL || !read_pixels(path, library, p, &info, &im, e))
         return false;
-    bool ok = image_uncrop(&info, &im, e) && take_colours(&im, info.power, out, e);
+    bool ok = image_uncrop(&info, &im, e) && take_colours(&im, &info, out, e);
     image_free(&im);
     return ok || err_prefix(e, "%s", path);
 }
