@@ -103,7 +103,7 @@ find_claim() {
 # run_mutant NAME: "status|cpu|scene|against|why" into $build/mutants/NAME.result
 run_mutant() {
     local name=$1 by cpu status line
-    if ! build_mutant "$name" 2>"$build/mutants/$name.log"; then
+    if ! build_mutant "$name" >"$build/mutants/$name.log" 2>&1; then
         echo "broken|0|||does not apply or compile: $build/mutants/$name.log" >"$build/mutants/$name.result"
         return
     fi
