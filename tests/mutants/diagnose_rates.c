@@ -318,11 +318,6 @@ static bool render_singles(const struct rate_image *r, struct pool *p, const cha
     return true;
 }
 
-static int count_accused(const struct diagnosis *d)
-{
-    return d->finding != FINDING_CORRECT;
-}
-
 static bool rate_synthetic(const struct rate_image *r, struct pool *p, struct err *e)
 {
     struct observation *clue = calloc((size_t)r->c.num_views, sizeof *clue);
@@ -341,7 +336,7 @@ static bool rate_synthetic(const struct rate_image *r, struct pool *p, struct er
         ok = ok && diagnose(&r->c, clue, r->c.num_views, &opt, &d, e);
         if (!ok)
             break;
-        accused += count_accused(&d);
+        accused += d.finding != FINDING_CORRECT;
         log10_p = fmin(log10_p, d.log10_p);
         lead = fmax(lead, d.largest_lead);
     }
@@ -373,7 +368,7 @@ static bool rate_correct(const struct rate_image *r, struct err *e)
         struct diagnosis d;
         ok = diagnose(&r->c, task[k].clue, r->c.num_views, &opt, &d, e);
         if (ok) {
-            accused += count_accused(&d);
+            accused += d.finding != FINDING_CORRECT;
             log10_p = fmin(log10_p, d.log10_p);
             lead = fmax(lead, d.largest_lead);
             if (d.finding != FINDING_CORRECT)
@@ -415,15 +410,18 @@ int main(int argc, char **argv)
             "# How often a bug is named rightly\n\nWritten by `make diagnose-rates` (`tests/mutants/diagnose_rates.c`); "
             "%d bugs, %d views. How: tools/docs/background/diagnosis.md.\n",
             r.c.num_bugs, r.c.num_views);
-    if (ok && (*part == '\0' || strcmp(part, "same") == 0))
-        ok = rate_bugs(&r, 100, 100, 74, &e);
-    if (ok && (*part == '\0' || strcmp(part, "large") == 0))
-        ok = rate_bugs(&r, 150, 75, 71, &e);
-    /* As many samples in all as the catalogue has, and half as many. */
-    if (ok && (*part == '\0' || strcmp(part, "small") == 0))
-        ok = rate_bugs(&r, 50, 400, 73, &e);
-    if (ok && (*part == '\0' || strcmp(part, "few") == 0))
-        ok = rate_bugs(&r, 50, 200, 72, &e);
+    /* small, few: as many samples in all as the catalogue has, and half as many. */
+    static const struct {
+        const char *part;
+        int scale_percent, spp_percent, seed;
+    } bugs[] = {{"same", 100, 100, 74},
+                {"large", 150, 75, 71},
+                {"small", 50, 400, 73},
+                {"few", 50, 200, 72}};
+    for (size_t i = 0; ok && i < sizeof bugs / sizeof *bugs; i++)
+        if (*part == '\0' || strcmp(part, bugs[i].part) == 0)
+            ok = rate_bugs(&r, bugs[i].scale_percent, bugs[i].spp_percent, (uint64_t)bugs[i].seed,
+                           &e);
     if (ok && (*part == '\0' || strcmp(part, "correct") == 0))
         ok = rate_correct(&r, &e);
     if (!ok)

@@ -3,7 +3,9 @@
 #include "tools/stats/distributions.h"
 
 #include <gsl/gsl_sf_erf.h>
+#include <gsl/gsl_sort.h>
 #include <math.h>
+#include <stdlib.h>
 
 void anchor_xyz(const double light[3], double xyz[3])
 {
@@ -48,35 +50,13 @@ size_t mitsuba_allowed(double share, size_t pixels)
     return allowed;
 }
 
-/* The k-th largest, k = 0 the largest [Hoare61, in Wirth's form]. */
-static double kth_largest(double *x, ptrdiff_t n, ptrdiff_t k)
+double mitsuba_score(const double *z, size_t pixels, size_t allowed)
 {
-    ptrdiff_t lo = 0, hi = n - 1;
-    while (lo < hi) {
-        double pivot = x[k];
-        ptrdiff_t i = lo, j = hi;
-        while (i <= j) {
-            while (x[i] > pivot)
-                i++;
-            while (x[j] < pivot)
-                j--;
-            if (i > j)
-                break;
-            double t = x[i];
-            x[i++] = x[j];
-            x[j--] = t;
-        }
-        if (j < k)
-            lo = i;
-        if (k < i)
-            hi = j;
-    }
-    return x[k];
-}
-
-double mitsuba_score(double *z, size_t pixels, size_t allowed)
-{
-    return kth_largest(z, (ptrdiff_t)(3 * pixels), (ptrdiff_t)allowed);
+    double *largest = calloc(allowed + 1, sizeof *largest);
+    gsl_sort_largest(largest, allowed + 1, z, 1, 3 * pixels);
+    double score = largest[allowed];
+    free(largest);
+    return score;
 }
 
 double welch_log10_p(const struct moments *a, const struct moments *b)

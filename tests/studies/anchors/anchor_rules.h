@@ -34,8 +34,8 @@ size_t mitsuba_failures(const double *z, size_t pixels, double critical_z);
 /* The most channels that may fail. */
 size_t mitsuba_allowed(double share, size_t pixels);
 /* The critical z at and below which the image fails when `allowed` channels may: the (allowed+1)-th
- * largest. Reorders z. */
-double mitsuba_score(double *z, size_t pixels, size_t allowed);
+ * largest. */
+double mitsuba_score(const double *z, size_t pixels, size_t allowed);
 
 /* Eradiate, src/eradiate/test_tools/regression.py, class ZTest (read at commit 00b1015): the
  * difference of every value of the two sides over the root of the sum of the variances of both means,

@@ -22,46 +22,25 @@ const char *const anchor_scenes[NUM_ANCHOR_SCENES] = {"33_sphere_light", "41_cor
 
 const char *const anchor_error_id[NUM_ANCHOR_ERRORS] = {"global", "bounced", "region"};
 
-const char *const anchor_rule_id[NUM_ANCHOR_RULES] = {
-    [RULE_GATE_STRICT] = "gate_1e-6",
-    [RULE_GATE] = "gate_1e-3",
-    [RULE_SAME_STRICT] = "same_program_1e-6",
-    [RULE_MITSUBA] = "mitsuba",
-    [RULE_WELCH] = "welch_1e-2",
-    [RULE_WELCH_STRICT] = "welch_1e-6",
-    [RULE_TILES] = "tiles_1e-6",
-    [RULE_IDIFF] = "idiff",
-    [RULE_GATE_TUNED] = "gate_tuned",
-    [RULE_SAME_TUNED] = "same_program_tuned",
-    [RULE_MITSUBA_LEVEL_TUNED] = "mitsuba_level_tuned",
-    [RULE_MITSUBA_SHARE_TUNED] = "mitsuba_share_tuned",
-    [RULE_WELCH_TUNED] = "welch_tuned",
-    [RULE_TILES_TUNED] = "tiles_tuned",
-    [RULE_RMSE_TUNED] = "rmse_tuned",
-    [RULE_FLIP_TUNED] = "flip_tuned",
-    [RULE_IDIFF_FAIL_TUNED] = "idiff_fail_tuned",
-    [RULE_IDIFF_PERCENT_TUNED] = "idiff_percent_tuned",
-};
-
-const char *const anchor_rule_name[NUM_ANCHOR_RULES] = {
-    [RULE_GATE_STRICT] = "ours, alpha 1e-6",
-    [RULE_GATE] = "ours, alpha 1e-3",
-    [RULE_SAME_STRICT] = "ours, same program, 1e-6",
-    [RULE_MITSUBA] = "Mitsuba 3",
-    [RULE_WELCH] = "Welch per pixel, 0.01",
-    [RULE_WELCH_STRICT] = "Welch per pixel, 1e-6",
-    [RULE_TILES] = "z of tiles, 1e-6",
-    [RULE_IDIFF] = "idiff as Blender",
-    [RULE_GATE_TUNED] = "ours",
-    [RULE_SAME_TUNED] = "ours, same program",
-    [RULE_MITSUBA_LEVEL_TUNED] = "Mitsuba 3, its level",
-    [RULE_MITSUBA_SHARE_TUNED] = "Mitsuba 3, its share",
-    [RULE_WELCH_TUNED] = "Welch per pixel",
-    [RULE_TILES_TUNED] = "z of tiles",
-    [RULE_RMSE_TUNED] = "RMSE",
-    [RULE_FLIP_TUNED] = "FLIP, mean",
-    [RULE_IDIFF_FAIL_TUNED] = "idiff, -fail",
-    [RULE_IDIFF_PERCENT_TUNED] = "idiff, -failpercent",
+const struct anchor_rule_row anchor_rules[NUM_ANCHOR_RULES] = {
+    [RULE_GATE_STRICT] = {"gate_1e-6", "ours, alpha 1e-6", 6},
+    [RULE_GATE] = {"gate_1e-3", "ours, alpha 1e-3", 3},
+    [RULE_SAME_STRICT] = {"same_program_1e-6", "ours, same program, 1e-6", 6},
+    [RULE_MITSUBA] = {"mitsuba", "Mitsuba 3"},
+    [RULE_WELCH] = {"welch_1e-2", "Welch per pixel, 0.01", 2},
+    [RULE_WELCH_STRICT] = {"welch_1e-6", "Welch per pixel, 1e-6", 6},
+    [RULE_TILES] = {"tiles_1e-6", "z of tiles, 1e-6", 6},
+    [RULE_IDIFF] = {"idiff", "idiff as Blender", BLENDER_PERCENT},
+    [RULE_GATE_TUNED] = {"gate_tuned", "ours"},
+    [RULE_SAME_TUNED] = {"same_program_tuned", "ours, same program"},
+    [RULE_MITSUBA_LEVEL_TUNED] = {"mitsuba_level_tuned", "Mitsuba 3, its level"},
+    [RULE_MITSUBA_SHARE_TUNED] = {"mitsuba_share_tuned", "Mitsuba 3, its share"},
+    [RULE_WELCH_TUNED] = {"welch_tuned", "Welch per pixel"},
+    [RULE_TILES_TUNED] = {"tiles_tuned", "z of tiles"},
+    [RULE_RMSE_TUNED] = {"rmse_tuned", "RMSE"},
+    [RULE_FLIP_TUNED] = {"flip_tuned", "FLIP, mean"},
+    [RULE_IDIFF_FAIL_TUNED] = {"idiff_fail_tuned", "idiff, -fail"},
+    [RULE_IDIFF_PERCENT_TUNED] = {"idiff_percent_tuned", "idiff, -failpercent"},
 };
 
 static json_t *pack_outcome(const struct anchor_outcome *o)
@@ -86,7 +65,7 @@ bool anchors_save(const char *path, const struct anchor_results *r, struct err *
         const struct anchor_scene_result *scene = &r->scene[s];
         json_t *rules = json_object();
         for (int k = 0; k < NUM_ANCHOR_RULES; k++)
-            json_object_set_new(rules, anchor_rule_id[k], pack_outcome(&scene->rule[k]));
+            json_object_set_new(rules, anchor_rules[k].id, pack_outcome(&scene->rule[k]));
         json_array_append_new(scenes, json_pack("{ss ss sf si so}", "scene", scene->scene, "title",
                                                 scene->title, "noise", scene->noise, "places",
                                                 scene->num_places, "rules", rules));
@@ -132,9 +111,9 @@ static bool read_scene(json_t *json, struct anchor_scene_result *s, struct err *
     snprintf(s->scene, sizeof s->scene, "%s", name);
     snprintf(s->title, sizeof s->title, "%s", title);
     for (int k = 0; k < NUM_ANCHOR_RULES; k++)
-        if (!read_outcome(json_object_get(json_object_get(json, "rules"), anchor_rule_id[k]),
+        if (!read_outcome(json_object_get(json_object_get(json, "rules"), anchor_rules[k].id),
                           &s->rule[k]))
-            return err_set(e, "%s: %s lacks a member", name, anchor_rule_id[k]);
+            return err_set(e, "%s: %s lacks a member", name, anchor_rules[k].id);
     return true;
 }
 

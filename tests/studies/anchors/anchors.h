@@ -46,8 +46,11 @@ enum anchor_rule {
     RULE_IDIFF_PERCENT_TUNED, /* -failpercent, with -fail 0.016 */
     NUM_ANCHOR_RULES
 };
-extern const char *const anchor_rule_id[NUM_ANCHOR_RULES];   /* in results.json */
-extern const char *const anchor_rule_name[NUM_ANCHOR_RULES]; /* on the page */
+struct anchor_rule_row {
+    const char *id, *name; /* in results.json, on the page */
+    double published;      /* threshold; 0: has none, or (RULE_MITSUBA) one by the image's size */
+};
+extern const struct anchor_rule_row anchor_rules[NUM_ANCHOR_RULES];
 
 /* A bias found with anchor_settings.power: the order statistic of the smallest biases found in each
  * pair, with its 95 % interval (binomial ranks, no law assumed). INFINITY: more than was tried.

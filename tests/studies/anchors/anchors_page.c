@@ -9,20 +9,24 @@
 #include <string.h>
 
 static const struct {
-    enum anchor_error kind;
-    const char *heading, *what;
-} errors[] = {
-    {ANCHOR_GLOBAL, "Global brightness",
-     "All light of A times 1 + b. Where a lamp or the sky is seen directly there is no noise, and one "
-     "value on each side: ours and Welch's hold those to 1e-5, Mitsuba's to its floor on the variance."},
-    {ANCHOR_BOUNCED, "Brightness of bounced light",
-     "Light of A that has bounced times 1 + b, as a wrong factor in a BSDF or a light's density makes "
-     "it; emitters and sky seen directly stay right."},
-    {ANCHOR_REGION, "Brightness of one region",
-     "The same in one square of 16 x 16 pixels. The squares do not lie on any tile; pairs take them in "
-     "turn, so a figure is over pairs and places together."},
+    const char *heading, *what, *plot;
+} errors[NUM_ANCHOR_ERRORS] = {
+    [ANCHOR_GLOBAL] =
+        {"Global brightness",
+         "All light of A times 1 + b. Where a lamp or the sky is seen directly there is no noise, and one "
+         "value on each side: ours and Welch's hold those to 1e-5, Mitsuba's to its floor on the variance.",
+         "Global brightness error that each test finds"},
+    [ANCHOR_BOUNCED] =
+        {"Brightness of bounced light",
+         "Light of A that has bounced times 1 + b, as a wrong factor in a BSDF or a light's density makes "
+         "it; emitters and sky seen directly stay right.",
+         "Error of bounced light that each test finds"},
+    [ANCHOR_REGION] =
+        {"Brightness of one region",
+         "The same in one square of 16 x 16 pixels. The squares do not lie on any tile; pairs take them in "
+         "turn, so a figure is over pairs and places together.",
+         "Error of one 16 x 16 region that each test finds"},
 };
-enum { NUM_SECTIONS = sizeof errors / sizeof errors[0] };
 
 static const enum anchor_rule reference_rule[] = {RULE_GATE_STRICT, RULE_GATE_TUNED};
 
@@ -67,7 +71,7 @@ static void bias_row(FILE *f, const struct anchor_results *r, enum anchor_rule r
                      enum anchor_error kind)
 {
     bool tuned = rule >= RULE_GATE_TUNED;
-    fprintf(f, "| %s%s |", anchor_rule_name[rule], tuned ? " (set)" : "");
+    fprintf(f, "| %s%s |", anchor_rules[rule].name, tuned ? " (set)" : "");
     for (int s = 0; s < r->num_scenes; s++) {
         const struct anchor_outcome *o = &r->scene[s].rule[rule],
                                     *ours = &r->scene[s].rule[reference_rule[tuned]];
@@ -93,7 +97,7 @@ static void bias_row(FILE *f, const struct anchor_results *r, enum anchor_rule r
 static void false_alarm_row(FILE *f, const struct anchor_results *r, enum anchor_rule rule)
 {
     bool tuned = rule >= RULE_GATE_TUNED;
-    fprintf(f, "| %s%s |", anchor_rule_name[rule], tuned ? " (set)" : "");
+    fprintf(f, "| %s%s |", anchor_rules[rule].name, tuned ? " (set)" : "");
     for (int s = 0; s < r->num_scenes; s++) {
         const struct anchor_outcome *o = &r->scene[s].rule[rule];
         double k = o->false_alarms, n = r->settings.num_pairs;
@@ -108,18 +112,16 @@ static void false_alarm_row(FILE *f, const struct anchor_results *r, enum anchor
 
 static void claims(FILE *f, const struct anchor_results *r)
 {
-    static const enum anchor_error kinds[] = {ANCHOR_GLOBAL, ANCHOR_BOUNCED, ANCHOR_REGION};
     fputs(
         "## The claim\n\nOurs at alpha = 1e-6 finds a bias at least 5 times smaller than Mitsuba's "
         "rule as published, with the same\npower. Ratio of the two, and whether that holds:\n\n",
         f);
     header(f, r, "bias");
-    for (size_t k = 0; k < sizeof kinds / sizeof kinds[0]; k++) {
-        fprintf(f, "| %s |", errors[kinds[k]].heading);
+    for (int k = 0; k < NUM_ANCHOR_ERRORS; k++) {
+        fprintf(f, "| %s |", errors[k].heading);
         for (int s = 0; s < r->num_scenes; s++) {
             const struct anchor_outcome *rule = r->scene[s].rule;
-            double ratio =
-                rule[RULE_MITSUBA].bias[kinds[k]].b / rule[RULE_GATE_STRICT].bias[kinds[k]].b;
+            double ratio = rule[RULE_MITSUBA].bias[k].b / rule[RULE_GATE_STRICT].bias[k].b;
             fprintf(f, " %s, %s |", isfinite(ratio) ? times(ratio).s : "-",
                     anchors_useless(r, &rule[RULE_MITSUBA]) ? "no comparison: false alarms"
                     : ratio >= 5                            ? "holds"
@@ -235,12 +237,12 @@ static void tables(FILE *f, const struct anchor_results *r)
     for (int s = 0; s < r->num_scenes; s++)
         fprintf(f, " %s %.2f%s", r->scene[s].scene, r->scene[s].noise,
                 s + 1 < r->num_scenes ? "," : ".\n\n");
-    for (int i = 0; i < NUM_SECTIONS; i++) {
+    for (int i = 0; i < NUM_ANCHOR_ERRORS; i++) {
         fprintf(f, "## %s\n\n%s Ratios are to ours at alpha 1e-6, of set rules to ours set.\n\n",
                 errors[i].heading, errors[i].what);
         header(f, r, "rule");
         for (int k = 0; k < NUM_ANCHOR_RULES; k++)
-            bias_row(f, r, k, errors[i].kind);
+            bias_row(f, r, k, i);
         fputc('\n', f);
     }
 }
@@ -268,21 +270,12 @@ static void page(FILE *f, const struct anchor_results *r)
 
 bool anchors_write_page(const char *dir, const struct anchor_results *r, struct err *e)
 {
-    char path[4096];
     struct out_file o;
-    static const struct {
-        enum anchor_error kind;
-        const char *title;
-    } plots[] = {{ANCHOR_GLOBAL, "Global brightness error that each test finds"},
-                 {ANCHOR_BOUNCED, "Error of bounced light that each test finds"},
-                 {ANCHOR_REGION, "Error of one 16 x 16 region that each test finds"}};
-    for (size_t i = 0; i < sizeof plots / sizeof plots[0]; i++) {
-        snprintf(path, sizeof path, "%s/%s.svg", dir, anchor_error_id[plots[i].kind]);
-        if (!anchors_write_plot(path, r, plots[i].kind, plots[i].title, e))
+    for (int i = 0; i < NUM_ANCHOR_ERRORS; i++)
+        if (!anchors_write_plot(fs_path("%s/%s.svg", dir, anchor_error_id[i]).s, r, i,
+                                errors[i].plot, e))
             return false;
-    }
-    snprintf(path, sizeof path, "%s/README.md", dir);
-    if (!out_open(&o, path, e))
+    if (!out_open(&o, fs_path("%s/README.md", dir).s, e))
         return false;
     page(o.f, r);
     return out_commit(&o, e);

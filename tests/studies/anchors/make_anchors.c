@@ -178,28 +178,9 @@ static double score(const struct measurement *m, struct bench *t, enum anchor_ru
 /* Thresholds as published, and which rules have one to set. */
 static bool published_threshold(enum anchor_rule rule, size_t pixels, double *threshold)
 {
-    switch (rule) {
-    case RULE_GATE_STRICT: *threshold = 6; return true;
-    case RULE_GATE: *threshold = 3; return true;
-    case RULE_MITSUBA: *threshold = (double)mitsuba_allowed(MITSUBA_SHARE, pixels); return true;
-    case RULE_WELCH: *threshold = -log10(WELCH_LEVEL); return true;
-    case RULE_SAME_STRICT:
-    case RULE_TILES:
-    case RULE_WELCH_STRICT: *threshold = 6; return true;
-    case RULE_IDIFF: *threshold = BLENDER_PERCENT; return true;
-    case RULE_GATE_TUNED:
-    case RULE_SAME_TUNED:
-    case RULE_MITSUBA_LEVEL_TUNED:
-    case RULE_MITSUBA_SHARE_TUNED:
-    case RULE_WELCH_TUNED:
-    case RULE_TILES_TUNED:
-    case RULE_RMSE_TUNED:
-    case RULE_FLIP_TUNED:
-    case RULE_IDIFF_FAIL_TUNED:
-    case RULE_IDIFF_PERCENT_TUNED:
-    case NUM_ANCHOR_RULES: break;
-    }
-    return false;
+    *threshold = rule == RULE_MITSUBA ? (double)mitsuba_allowed(MITSUBA_SHARE, pixels)
+                                      : anchor_rules[rule].published;
+    return rule < RULE_GATE_TUNED;
 }
 
 static bool one_sided(enum anchor_rule rule) /* judges A against the long reference */

@@ -155,14 +155,13 @@ TEST(test_rmse)
  * 0.02584, 6.6. 4/255 = 0.01569 is not over 0.016, 5/255 is. 1 % of 4096 is 40.96: 40 may fail. */
 TEST(test_idiff_boundary)
 {
-    struct moments m = new_moments(2, 1, "sample");
+    OWN(moments) m = new_moments(2, 1, "sample");
     const double light[6] = {0, 1, 3, 0.5, 0.002, -1};
     memcpy(m.mean, light, sizeof light);
     uint8_t got[6];
     static const uint8_t want[6] = {0, 255, 255, 188, 7, 0};
     idiff_quantise(&m, 1, got);
     assert_memory_equal(got, want, 6);
-    moments_free(&m);
 
     static uint8_t a[3 * PIXELS], b[3 * PIXELS];
     size_t count[256];
@@ -340,11 +339,10 @@ TEST(test_real_renders)
  * each bias is found in 95 % of the 200 pairs when a rule is asked again. */
 TEST(test_page)
 {
-    struct anchor_results *r = calloc(1, sizeof *r);
+    static struct anchor_results r;
     struct err e = {""};
-    assert_non_null(r);
-    MUST(anchors_load("tests/studies/anchors/results.json", r, &e));
-    const struct anchor_settings *got = &r->settings, *want = &anchor_settings;
+    MUST(anchors_load("tests/studies/anchors/results.json", &r, &e));
+    const struct anchor_settings *got = &r.settings, *want = &anchor_settings;
     assert_int_equal(got->side, want->side);
     assert_int_equal(got->spp, want->spp);
     assert_int_equal(got->reference_spp, want->reference_spp);
@@ -353,48 +351,41 @@ TEST(test_page)
     assert_int_equal(got->seed, want->seed);
     assert_near(got->tuned, want->tuned, 0);
     assert_near(got->power, want->power, 0);
-    assert_int_equal(r->num_scenes, NUM_ANCHOR_SCENES);
-    for (int s = 0; s < r->num_scenes; s++) {
-        assert_string_equal(r->scene[s].scene, anchor_scenes[s]);
+    assert_int_equal(r.num_scenes, NUM_ANCHOR_SCENES);
+    for (int s = 0; s < r.num_scenes; s++) {
+        assert_string_equal(r.scene[s].scene, anchor_scenes[s]);
         for (int k = 0; k < NUM_ANCHOR_RULES; k++)
             for (int i = 0; i < NUM_ANCHOR_ERRORS; i++) {
-                const struct anchor_bias *b = &r->scene[s].rule[k].bias[i];
+                const struct anchor_bias *b = &r.scene[s].rule[k].bias[i];
                 assert_true(b->lo <= b->b && b->b <= b->hi);
                 if (isfinite(b->b) && b->found < 190)
                     fail_msg("%s, %s: %s is found in %d pairs only", anchor_scenes[s],
-                             anchor_rule_id[k], anchor_error_id[i], b->found);
+                             anchor_rules[k].id, anchor_error_id[i], b->found);
             }
     }
     assert_true(fs_make_dirs(test_path("page"), &e));
-    MUST(anchors_write_page(test_path("page"), r, &e));
+    MUST(anchors_write_page(test_path("page"), &r, &e));
     static const char *const files[] = {"README.md", "global.svg", "bounced.svg", "region.svg"};
     for (size_t i = 0; i < COUNT(files); i++) {
-        char made[128], kept[128];
-        snprintf(made, sizeof made, "page/%s", files[i]);
-        snprintf(kept, sizeof kept, "tests/studies/anchors/%s", files[i]);
-        char *a = test_read(test_path(made)), *b = test_read(kept);
+        OWN_TEXT a = test_read(fs_path("%s/%s", test_path("page"), files[i]).s);
+        OWN_TEXT b = test_read(fs_path("tests/studies/anchors/%s", files[i]).s);
         if (strcmp(a, b) != 0)
             fail_msg("%s is not what results.json gives: make_anchors --page tests/studies/anchors",
-                     kept);
-        free(a);
-        free(b);
+                     files[i]);
     }
-    free(r);
 }
 
 /* A record that is damaged is a line, not a page. */
 TEST(test_damaged_record)
 {
-    struct anchor_results *r = calloc(1, sizeof *r);
+    static struct anchor_results r;
     struct err e = {""};
     const char *path = test_path("results.json");
-    assert_non_null(r);
     static const char *const bad[] = {"", "{", "{\"settings\": {}}", "[]"};
     for (size_t i = 0; i < COUNT(bad); i++) {
         test_write(path, bad[i], strlen(bad[i]));
-        REFUSES(anchors_load(path, r, &e), path);
+        REFUSES(anchors_load(path, &r, &e), path);
     }
     assert_int_equal(unlink(path), 0);
-    assert_false(anchors_load(path, r, &e));
-    free(r);
+    assert_false(anchors_load(path, &r, &e));
 }

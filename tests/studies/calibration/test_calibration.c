@@ -8,18 +8,8 @@
 #include "tests/support/rates.h"
 
 #include "renderer/base/sha256.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
-
-/* Closed forms: no success in 10 has the upper bound 1 - tail^(1/10), 10 of 10 the lower bound
- * tail^(1/10); 5 of 10 at 95 % is [0.1871, 0.8129] in every table of [ClopperPearson34]. */
-TEST(test_bounds)
-{
-    assert_near(rate_upper(0, 10, 0.05), 1 - pow(0.05, 0.1), 1e-12);
-    assert_near(rate_lower(10, 10, 0.05), pow(0.05, 0.1), 1e-12);
-    assert_near(rate_lower(5, 10, 0.025), 0.1871, 5e-5);
-    assert_near(rate_upper(5, 10, 0.025), 0.8129, 5e-5);
-    assert_true(rate_lower(0, 10, 0.05) == 0 && rate_upper(10, 10, 0.05) == 1);
-}
 
 /* Critical values from the tables: Kolmogorov 1.3581 (5 %), 1.6276 (1 %) over sqrt n for large n;
  * Anderson-Darling 2.492 (5 %), 3.878 (1 %) [Stephens74]. The statistics of three numbers by hand (KS)
@@ -53,10 +43,10 @@ TEST(test_uniformity)
 TEST(test_library)
 {
     enum { SIDE = 64, IMAGES = 4 };
-    struct library l;
+    OWN(library) l;
     struct err e;
     assert_true(library_init(&l, LAW_EXPONENTIAL, 16, 65536, 5, &e));
-    struct moments m = new_moments(SIDE, SIDE, "sample");
+    OWN(moments) m = new_moments(SIDE, SIDE, "sample");
     double sum[3] = {0}, square[3] = {0}, cross = 0, num = 0;
     for (int image = 0; image < IMAGES; image++) {
         library_image(&l, 4, false, NULL, &m);
@@ -85,8 +75,6 @@ TEST(test_library)
     library_image(&l, 4, true, NULL, &m);
     for (size_t i = 0; i < 3 * SIDE * SIDE; i += 3)
         assert_true(m.mean[i] == m.mean[i + 1] && m.m3[i] == m.m3[i + 2]);
-    library_free(&l);
-    moments_free(&m);
 }
 
 static void run_short(enum weakness weakness, int threads, struct results *r, struct checks *c)
@@ -156,7 +144,7 @@ TEST(test_published_page)
 {
     char hex[65], line[96];
     struct settings s = settings_published(1);
-    char *text = test_read("tests/studies/calibration/README.md");
+    OWN_TEXT text = test_read("tests/studies/calibration/README.md");
     settings_hash(&s, hex);
     snprintf(line, sizeof line, "Settings: `%s`.", hex);
     if (strstr(text, line) == NULL)
@@ -174,5 +162,4 @@ TEST(test_published_page)
         snprintf(line, sizeof line, "(%s.svg)", plots[i]);
         assert_non_null(strstr(text, line));
     }
-    free(text);
 }

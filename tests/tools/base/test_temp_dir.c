@@ -23,12 +23,10 @@ static int tear_down(void **state)
     return 0;
 }
 
-static bool write_file(const char *dir, const char *text)
+static bool write_file(const char *dir)
 {
-    char path[600];
-    snprintf(path, sizeof path, "%s/file", dir);
-    FILE *f = fopen(path, "w");
-    bool ok = f != NULL && fputs(text, f) >= 0;
+    FILE *f = fopen(fs_path("%s/file", dir).s, "w");
+    bool ok = f != NULL && fputs("kept", f) >= 0;
     return f != NULL && fclose(f) == 0 && ok;
 }
 
@@ -48,7 +46,7 @@ static pid_t hold(const char *name, char path[512])
     if (pid == 0) {
         struct temp_dir d;
         struct err e;
-        if (!temp_dir_open(&d, name, &e) || !write_file(d.path, "kept") ||
+        if (!temp_dir_open(&d, name, &e) || !write_file(d.path) ||
             write(ends[1], d.path, sizeof d.path) != sizeof d.path)
             _exit(1);
         alarm(60); /* where the test fails before it ends this one */
@@ -79,7 +77,7 @@ TEST(it_is_ours_and_removed)
     assert_int_equal(stat(d.path, &st), 0);
     assert_int_equal(st.st_mode & 0777, 0700);
     assert_int_equal(st.st_uid, geteuid());
-    assert_true(write_file(d.path, "x"));
+    assert_true(write_file(d.path));
     char path[512];
     strcpy(path, d.path);
     assert_true(temp_dir_close(&d, &e));
@@ -115,25 +113,23 @@ TEST(nothing_else_is_removed)
 {
     struct temp_dir d;
     struct err e = {""};
-    char link[600], file[600], target[600], longer[600];
     assert_true(temp_dir_open(&d, "like", &e));
-    size_t start = strlen(d.path) - 6;
-    snprintf(link, sizeof link, "%.*sabcdef", (int)start, d.path);
-    snprintf(file, sizeof file, "%.*sghijkl", (int)start, d.path);
-    snprintf(longer, sizeof longer, "%.*sabcdefg", (int)start, d.path);
-    snprintf(target, sizeof target, "%s/precious", temp);
+    const int start = (int)strlen(d.path) - 6;
+    const struct path link = fs_path("%.*sabcdef", start, d.path),
+                      file = fs_path("%.*sghijkl", start, d.path),
+                      longer = fs_path("%.*sabcdefg", start, d.path),
+                      target = fs_path("%s/precious", temp);
     assert_true(temp_dir_close(&d, &e));
-    assert_int_equal(mkdir(target, 0700), 0);
-    assert_int_equal(mkdir(longer, 0700), 0);
-    assert_true(write_file(target, "precious"));
-    assert_int_equal(symlink(target, link), 0);
-    assert_int_equal(mkdir(file, 0700), 0); /* what there is to remove: the control */
+    assert_int_equal(mkdir(target.s, 0700), 0);
+    assert_int_equal(mkdir(longer.s, 0700), 0);
+    assert_true(write_file(target.s));
+    assert_int_equal(symlink(target.s, link.s), 0);
+    assert_int_equal(mkdir(file.s, 0700), 0); /* what there is to remove: the control */
     assert_true(temp_dir_open(&d, "like", &e));
-    assert_false(is_there(file));
-    assert_true(is_there(link));
-    assert_true(is_there(longer));
-    strcat(target, "/file");
-    assert_true(is_there(target));
+    assert_false(is_there(file.s));
+    assert_true(is_there(link.s));
+    assert_true(is_there(longer.s));
+    assert_true(is_there(fs_path("%s/file", target.s).s));
     assert_true(temp_dir_close(&d, &e));
 }
 
@@ -148,11 +144,9 @@ TEST(many_at_once)
         for (int k = 0; pid[i] == 0 && k < TIMES; k++) {
             struct temp_dir d;
             struct err e;
-            char path[600];
-            if (!temp_dir_open(&d, "many", &e) || !write_file(d.path, "x"))
+            if (!temp_dir_open(&d, "many", &e) || !write_file(d.path))
                 _exit(1);
-            snprintf(path, sizeof path, "%s/file", d.path);
-            if (!is_there(path) || !temp_dir_close(&d, &e))
+            if (!is_there(fs_path("%s/file", d.path).s) || !temp_dir_close(&d, &e))
                 _exit(2);
         }
         if (pid[i] == 0)
@@ -168,9 +162,7 @@ TEST(many_at_once)
     struct err e;
     assert_true(temp_dir_open(&d, "many", &e));
     assert_true(temp_dir_close(&d, &e));
-    char command[700];
-    snprintf(command, sizeof command, "! ls '%s' | grep -q many", temp);
-    assert_int_equal(system(command), 0); /* NOLINT(cert-env33-c) */
+    assert_int_equal(system(fs_path("! ls '%s' | grep -q many", temp).s), 0);
 }
 
 TEST(no_room_is_a_line)

@@ -95,7 +95,7 @@ static void page_words(const char *page, const char *heading, struct words *out)
     bool in = false;
     snprintf(path, sizeof path, "tools/docs/formats/%s", page);
     snprintf(head, sizeof head, "| %s |", heading);
-    char *text = test_read(path);
+    OWN_TEXT text = test_read(path);
     *out = (struct words){.num = 0};
     for (char *line = text, *next; line != NULL; line = next) {
         next = strchr(line, '\n');
@@ -113,7 +113,6 @@ static void page_words(const char *page, const char *heading, struct words *out)
             assert_non_null(c);
         }
     }
-    free(text);
     if (out->num == 0)
         fail_msg("%s: no table of '%s'", page, heading);
 }
@@ -247,16 +246,13 @@ static bool knows_scene_key(const char *word)
 
 TEST(scenes_are_as_their_page_says)
 {
-    struct suite s;
+    OWN(suite) s;
     struct err e;
-    json_t *a = load_block("scene.md", 0), *b = load_block("scene.md", 1);
+    json_auto_t *a = load_block("scene.md", 0), *b = load_block("scene.md", 1);
     MUST(load_scenes(a, b, &s, &e));
     assert_int_equal(s.num_scenes, 2);
     assert_int_equal(s.scene[0].num_references, 3);
     assert_int_equal(s.scene[1].expect, VERDICT_DIFFERENT);
-    suite_free(&s);
-    json_decref(a);
-    json_decref(b);
     compare("scene.md", "key", (const char *const[]){"reference/suite", NULL}, knows_scene_key);
 }
 
@@ -300,7 +296,7 @@ TEST(suites_of_ones_own_are_as_their_page_says)
     static const char *const files[] = {"own/mine.json", "own/scenes/box.json",
                                         "own/scenes/wood.png", "own/scenes/ball.dae",
                                         "own/scenes/ball_dark.dae"};
-    struct suite s;
+    OWN(suite) s;
     struct err e;
     json_t *suite = load_block("suite.md", 0);
     MUST(fs_make_dirs(test_path("own/scenes"), &e));
@@ -312,7 +308,6 @@ TEST(suites_of_ones_own_are_as_their_page_says)
     assert_int_equal(s.num_scenes, 3);
     assert_int_equal(s.scene[0].num_references, 3);
     assert_int_equal(s.scene[1].expect, VERDICT_DIFFERENT);
-    suite_free(&s);
     compare("suite.md", "key", (const char *const[]){"reference/suite", NULL}, knows_suite_key);
 }
 
@@ -373,14 +368,12 @@ static bool knows_feature(const char *word)
 TEST(engines_are_as_their_page_says)
 {
     static const char *const reader[] = {"reference/external", NULL};
-    struct engine en;
+    OWN(engine) en;
     struct err e;
-    json_t *description = load_block("engine.md", 0);
+    json_auto_t *description = load_block("engine.md", 0);
     dump(description, "example.json");
     MUST(engine_load(test_path("example.json"), &en, &e));
     assert_int_equal(en.replicates, 64);
-    engine_free(&en);
-    json_decref(description);
     compare("engine.md", "key", reader, knows_engine_key);
     compare("engine.md", "placeholder", reader, knows_placeholder);
     compare("engine.md", "feature", (const char *const[]){"reference/suite", NULL}, knows_feature);
@@ -490,10 +483,9 @@ TEST(results_are_as_their_page_says)
 TEST(grades_are_as_their_page_says)
 {
     struct err e;
-    json_t *grades = json_pack("[o]", load_block("grades.md", 0));
+    json_auto_t *grades = json_pack("[o]", load_block("grades.md", 0));
     MUST(fs_make_dirs(test_path("grades/bob"), &e));
     MUST(grade_write(test_path("grades"), NULL, NULL, grades, &e));
-    json_decref(grades);
     json_auto_t *gradescope = json_load_file(test_path("grades/bob/results.json"), 0, NULL);
     const json_t *test = json_array_get(json_object_get(gradescope, "tests"), 0);
     assert_string_equal(json_string_value(json_object_get(test, "status")), "failed");

@@ -4,6 +4,7 @@
 
 #include "tools/compare/compare.h"
 #include "tests/support/own.h"
+#include "tests/support/simulate.h"
 #include "tests/support/test.h"
 
 /* Fails the test where there can be no comparison. */
@@ -14,6 +15,14 @@ static inline struct comparison compare(const struct moments *a, const struct mo
     struct err e;
     MUST(compare_moments(a, b, &opt, &c, &e));
     return c;
+}
+
+/* simulate() of both. */
+static inline void simulate_pair(struct moments *a, struct moments *b, enum law law, int n,
+                                 bool is_grey, uint64_t *seed)
+{
+    simulate(a, law, 1, n, is_grey, seed);
+    simulate(b, law, 1, n, is_grey, seed);
 }
 
 #endif

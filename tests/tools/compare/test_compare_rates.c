@@ -8,7 +8,6 @@
  * verdicts to fail: a true rate of 0.01 fails with probability 7e-4, one of 0.025 with 0.98 (both
  * binomial). */
 #include "tests/support/rates.h"
-#include "tests/support/simulate.h"
 
 #include "tools/stats/distributions.h"
 #include "compare_must.h"
@@ -41,8 +40,8 @@ static struct null_result run_null(const struct null_case *k, uint64_t seed, dou
                                    double *image_p)
 {
     struct null_result r = {0};
-    struct moments a = new_moments(k->side, k->side, "sample");
-    struct moments b = new_moments(k->side, k->side, k->n_b > 0 ? "sample" : "exact");
+    OWN(moments) a = new_moments(k->side, k->side, "sample");
+    OWN(moments) b = new_moments(k->side, k->side, k->n_b > 0 ? "sample" : "exact");
     int tiles = k->side / k->tile * (k->side / k->tile);
     double level = stats_normal_quantile(alpha / (2 * tiles));
     for (int i = 0; i < k->claims; i++) {
@@ -64,8 +63,6 @@ static struct null_result run_null(const struct null_case *k, uint64_t seed, dou
         r.different += c.verdict == VERDICT_DIFFERENT;
         r.judged += c.num_tests > 0;
     }
-    moments_free(&a);
-    moments_free(&b);
     print_message("%-34s %4d claims: DIFFERENT %4.2f %% (alpha 1 %%), uncorrected tiles %5.2f %%, "
                   "judged %3.0f %%\n",
                   k->name, k->claims, 100.0 * r.different / k->claims, 100.0 * r.naive / k->claims,
@@ -135,16 +132,14 @@ TEST(test_power)
     uint64_t seed = 77;
     double mdb = 0;
     for (int i = 0; i < 20; i++) {
-        simulate(&a, LAW_NORMAL, 1, 16, true, &seed);
-        simulate(&b, LAW_NORMAL, 1, 16, true, &seed);
+        simulate_pair(&a, &b, LAW_NORMAL, 16, true, &seed);
         OWN(comparison) c = compare(&a, &b, opt);
         mdb += c.mdb_global / 20;
     }
     int image[2] = {0}, verdict[2] = {0};
     for (int half = 0; half < 2; half++)
         for (int i = 0; i < CLAIMS; i++) {
-            simulate(&a, LAW_NORMAL, 1, 16, true, &seed);
-            simulate(&b, LAW_NORMAL, 1, 16, true, &seed);
+            simulate_pair(&a, &b, LAW_NORMAL, 16, true, &seed);
             for (size_t p = 0; p < 3 * 256; p++)
                 a.mean[p] += half ? mdb / 2 : mdb;
             OWN(comparison) c = compare(&a, &b, opt);
@@ -176,8 +171,7 @@ TEST(test_tile_power)
     int found[2] = {0};
     for (int half = -1; half < 2; half++)
         for (int i = 0; i < (half < 0 ? 20 : CLAIMS); i++) {
-            simulate(&a, LAW_NORMAL, 1, N, true, &seed);
-            simulate(&b, LAW_NORMAL, 1, N, true, &seed);
+            simulate_pair(&a, &b, LAW_NORMAL, N, true, &seed);
             for (int p = 0; half >= 0 && p < 256; p++)
                 for (int c = 0; p % 16 < 4 && p / 16 < 4 && c < 3; c++)
                     a.mean[3 * p + c] += half ? mdb / 2 : mdb;
@@ -209,8 +203,7 @@ static struct verdict_rate rate_with_bias(double bias, bool one_tile, bool grey,
     struct verdict_rate r = {0};
     struct moments a = new_moments(16, 16, "sample"), b = new_moments(16, 16, "replicate");
     for (int i = 0; i < claims; i++) {
-        simulate(&a, LAW_NORMAL, 1, 16, grey, &seed);
-        simulate(&b, LAW_NORMAL, 1, 16, grey, &seed);
+        simulate_pair(&a, &b, LAW_NORMAL, 16, grey, &seed);
         for (int p = 0; p < 256; p++)
             if (!one_tile || (p % 16 < opt.tile && p / 16 < opt.tile))
                 for (int c = 0; c < 3; c++)

@@ -115,11 +115,10 @@ static json_t *last_change(struct fixture *f, size_t count)
 {
     char path[256];
     snprintf(path, sizeof path, "%s/12_plane/manifest.json", f->golden);
-    json_t *all = json_load_file(path, 0, NULL);
+    json_auto_t *all = json_load_file(path, 0, NULL);
     json_t *changes = json_object_get(json_object_get(all, "cycles"), "changes");
     assert_int_equal(json_array_size(changes), count);
     json_t *last = json_deep_copy(json_array_get(changes, count - 1));
-    json_decref(all);
     assert_non_null(json_object_get(last, "date"));
     return last;
 }
@@ -132,10 +131,9 @@ static void assert_accepted(struct fixture *f, size_t count, const char *verdict
     hash(f->from, "cycles.exr", candidate);
     hash(f->golden, "cycles.exr", stored);
     assert_string_equal(candidate, stored);
-    struct golden g;
+    OWN(golden) g;
     golden_inspect(f->golden, &f->scene, &f->ref, &g);
     assert_int_equal(g.state, GOLDEN_CURRENT);
-    golden_free(&g);
     json_auto_t *change = last_change(f, count);
     assert_string_equal(json_string_value(json_object_get(change, "verdict")), verdict);
 }
@@ -207,11 +205,10 @@ TEST_WITH(a_difference_needs_a_reason, setup, teardown)
     assert_non_null(strstr(f->said, "DIFFERENT"));
     f->opt.why = "the lamp is brighter now";
     assert_accepted(f, 1, "DIFFERENT");
-    json_t *change = last_change(f, 1);
+    json_auto_t *change = last_change(f, 1);
     assert_string_equal(json_string_value(json_object_get(change, "why")),
                         "the lamp is brighter now");
     assert_float_equal(json_number_value(json_object_get(change, "difference")), 0.1, 0.01);
-    json_decref(change);
     f->opt.why = NULL;
     render(f, f->from, 1.1, 3);
     assert_accepted(f, 2, "EQUIVALENT"); /* the log goes on */
@@ -324,10 +321,9 @@ TEST_WITH(states_have_names_and_orphans_are_found, setup, teardown)
     assert_true(golden_remove(f->golden, "12_plane", "povray", &e));
     assert_true(golden_remove(f->golden, "12_plane", "povray", &e)); /* gone: fine */
     assert_true(golden_remove(f->golden, "12_other", "povray", &e));
-    struct golden g;
+    OWN(golden) g;
     golden_inspect(f->golden, &f->scene, &f->ref, &g);
     assert_int_equal(g.state, GOLDEN_MISSING);
-    golden_free(&g);
     render(f, f->golden, 1, 1);
     suite.num_scenes = 0;
     assert_true(golden_orphans(f->golden, &suite, &names, &e));

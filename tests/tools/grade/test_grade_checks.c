@@ -175,6 +175,14 @@ static struct result check(enum check_kind kind, int num, const struct bug *cons
     return run_check(r, image, alpha);
 }
 
+/* It gives a share of the points from least to most, and is freed. */
+static void expect_share(struct result r, double least, double most)
+{
+    if (r.share < least || r.share > most)
+        fail_msg("%g of the points: %s", r.share, r.seen);
+    result_free(&r);
+}
+
 static struct result equal(const struct bug *bug, double spp, double alpha)
 {
     return check(CHECK_EQUAL, 1, &bug, &spp, NULL, alpha);
@@ -500,7 +508,7 @@ TEST(what_is_accepted_costs_nothing_and_hides_nothing)
     }
     for (size_t k = 0; k < COUNT(cases); k++) {
         struct submitted_images *h = calloc(1, sizeof *h);
-        struct result out;
+        OWN(result) out;
         int set = -1;
         assert_non_null(h);
         h->image[0] = submit_render(&cases[k].bug, SPP);
@@ -508,7 +516,6 @@ TEST(what_is_accepted_costs_nothing_and_hides_nothing)
         if (set != cases[k].set || out.share != cases[k].share)
             fail_msg("case %zu: set %d, %g of the points: %s", k, set, out.share, out.seen);
         assert_string_equal(out.accepted, set == 1 ? "bright" : "");
-        result_free(&out);
         submitted_image_free(&h->image[0]);
         free(h);
     }
@@ -544,14 +551,10 @@ TEST(two_estimators_agree_or_not)
     const struct bug bright = {.scale = 1.2, .square = 1, .noise = 1},
                      noisy = {.scale = 1, .square = 1, .noise = 0.3};
     const double spp[] = {SPP, SPP};
-    struct result r =
-        check(CHECK_AGREE, 2, (const struct bug *const[]){&none, &noisy}, spp, NULL, 1e-5);
-    if (r.share < 1)
-        fail_msg("%g: %s", r.share, r.seen);
-    result_free(&r);
-    r = check(CHECK_AGREE, 2, (const struct bug *const[]){&none, &bright}, spp, NULL, 1e-5);
-    assert_true(r.share == 0);
-    result_free(&r);
+    expect_share(check(CHECK_AGREE, 2, (const struct bug *const[]){&none, &noisy}, spp, NULL, 1e-5),
+                 1, 1);
+    expect_share(
+        check(CHECK_AGREE, 2, (const struct bug *const[]){&none, &bright}, spp, NULL, 1e-5), 0, 0);
 }
 
 /* A third and two thirds; the lamp in all of them is saturated and says nothing. */
@@ -560,14 +563,12 @@ TEST(parts_add_up_or_not)
     const struct bug third = {.scale = 1.0 / 3, .square = 1, .noise = 1},
                      rest = {.scale = 2.0 / 3, .square = 1, .noise = 1};
     const double spp[] = {4 * SPP, 4 * SPP, 4 * SPP};
-    struct result r =
-        check(CHECK_SUM, 3, (const struct bug *const[]){&none, &third, &rest}, spp, NULL, 1e-5);
-    if (r.share < 1)
-        fail_msg("%g: %s", r.share, r.seen);
-    result_free(&r);
-    r = check(CHECK_SUM, 3, (const struct bug *const[]){&none, &rest, &rest}, spp, NULL, 1e-5);
-    assert_true(r.share == 0);
-    result_free(&r);
+    expect_share(
+        check(CHECK_SUM, 3, (const struct bug *const[]){&none, &third, &rest}, spp, NULL, 1e-5), 1,
+        1);
+    expect_share(
+        check(CHECK_SUM, 3, (const struct bug *const[]){&none, &rest, &rest}, spp, NULL, 1e-5), 0,
+        0);
 }
 
 /* The second image is asked for with 16 times the samples, and has them; or has as many as the first. */
@@ -575,14 +576,8 @@ TEST(noise_falls_or_not)
 {
     const struct bug *const two[] = {&none, &none};
     const int asked[] = {SPP / 4, 4 * SPP};
-    struct result r = check(CHECK_NOISE, 2, two, (const double[]){SPP / 4, 4 * SPP}, asked, 1e-5);
-    if (r.share < 1)
-        fail_msg("%g: %s", r.share, r.seen);
-    result_free(&r);
-    r = check(CHECK_NOISE, 2, two, (const double[]){SPP / 4, SPP / 4}, asked, 1e-5);
-    if (r.share > 0)
-        fail_msg("%g: %s", r.share, r.seen);
-    result_free(&r);
+    expect_share(check(CHECK_NOISE, 2, two, (const double[]){SPP / 4, 4 * SPP}, asked, 1e-5), 1, 1);
+    expect_share(check(CHECK_NOISE, 2, two, (const double[]){SPP / 4, SPP / 4}, asked, 1e-5), 0, 0);
 }
 
 TEST(pixels_are_exact_or_not)
@@ -591,14 +586,10 @@ TEST(pixels_are_exact_or_not)
     const struct bug square = {.scale = 1, .square = 0.2, .noise = 1};
     const struct bug *wrong = &square;
     const double spp = SPP;
-    struct result r = check(CHECK_EXACT, 1, &right, &spp, NULL, 1e-5);
-    if (r.share < 1)
-        fail_msg("%g: %s", r.share, r.seen);
-    result_free(&r);
-    r = check(CHECK_EXACT, 1, &wrong, &spp, NULL, 1e-5);
+    expect_share(check(CHECK_EXACT, 1, &right, &spp, NULL, 1e-5), 1, 1);
+    OWN(result) r = check(CHECK_EXACT, 1, &wrong, &spp, NULL, 1e-5);
     assert_true(r.share < 1);
     assert_non_null(strstr(r.seen, "64 of 3072 pixels differ (2.08 %), the first at 32,24"));
-    result_free(&r);
 }
 
 /* Blue 0 to red 1 through green, as the assignment has it: 16 is a quarter of 64, halfway from blue to green. */
@@ -610,16 +601,14 @@ TEST(samples_go_by_the_rule_of_stopping)
         .width = WIDTH, .height = HEIGHT, .spp = SPP, .options = "-a 16 0.15"};
     const double lamp = 64.0 / PIXELS, right = (1 - lamp) * 176 + lamp * 16,
                  one_sigma = (1 - lamp) * 48 + lamp * 16;
-    (void)state;
     for (int k = 0; k < 2; k++) {
         struct bug darker = none;
         struct stopping by[NUM_STOPPING_KINDS];
         struct err e;
         darker.scale = k == 0 ? 1 : 0.5;
-        struct submitted_image s = submit_render(&darker, SPP);
+        OWN(submitted_image) s = submit_render(&darker, SPP);
         submitted_image_expect(&s, &reference, SPP);
         MUST(stopping_rule_samples(&image, &s, &reference, by, &e));
-        submitted_image_free(&s);
         assert_true(by[STOPS_RIGHTLY].least <= right && right <= by[STOPS_RIGHTLY].most);
         assert_true(by[STOPS_RIGHTLY].most < 1.6 * by[STOPS_RIGHTLY].least);
         assert_true(by[STOPS_BY_ONE_SIGMA].least <= one_sigma &&

@@ -143,7 +143,6 @@ static const struct {
 
 TEST(a_bug_costs_points_in_its_own_part)
 {
-    (void)state;
     for (size_t i = 0; i < COUNT(known); i++) {
         struct outcome v = grade_bugs(bug_images_number(&of, known[i].bug), -1);
         if (known[i].other == NULL)
@@ -161,7 +160,6 @@ TEST(two_bugs_cost_points_in_both_parts)
     static const char *const pairs[][4] = {{"cosine_missing", "3", "indirect_missing", "4"},
                                            {"sphere_far_hit", "1", "light_area_doubled", "3"},
                                            {"diffuse_without_pi", "3", "roulette_squared", "4"}};
-    (void)state;
     for (size_t i = 0; i < COUNT(pairs); i++) {
         struct outcome v =
             grade_bugs(bug_images_number(&of, pairs[i][0]), bug_images_number(&of, pairs[i][2]));
@@ -200,7 +198,6 @@ static double share_of(const struct outcome *v, const char *check)
 TEST(a_mistake_without_a_name_is_paid_once)
 {
     struct outcome v = grade_unknown(bug_images_number(&of, "light_area_doubled"), -1);
-    (void)state;
     assert_true(share_of(&v, "shadow_rays") == 0);
     assert_true(share_of(&v, "five_bounces") == 1);
     assert_true(share_of(&v, "adaptive") == 1);
@@ -211,7 +208,6 @@ TEST(what_is_missing_is_not_carried_on)
 {
     struct outcome v = grade_unknown(bug_images_number(&of, "light_area_doubled"),
                                      bug_images_number(&of, "indirect_missing"));
-    (void)state;
     assert_true(share_of(&v, "five_bounces") == 0);
     assert_true(share_of(&v, "second_bounce") == 0);
 }
@@ -223,7 +219,6 @@ TEST(a_mistake_without_a_name_is_located)
     } cases[] = {{"hemisphere_without_weight", "only by uniform directions (-H)"},
                  {"indirect_albedo_squared", "only in light that bounced off a surface first"},
                  {"gamma_in_linear_file", "in every image"}};
-    (void)state;
     for (size_t i = 0; i < COUNT(cases); i++) {
         struct outcome v = grade_unknown(bug_images_number(&of, cases[i].bug), -1);
         if (strstr(v.mistake.located.text, cases[i].text) == NULL)
@@ -257,7 +252,6 @@ static struct submitted_images *hand_in_same(int like, uint8_t level)
 
 TEST(an_image_of_nothing_is_not_carried_on)
 {
-    (void)state;
     for (int level = 0; level < 255; level += 120) {
         struct submitted_images *h = hand_in_same(-1, (uint8_t)level);
         struct outcome v = grade(h);
@@ -271,7 +265,6 @@ TEST(an_image_of_nothing_is_not_carried_on)
 TEST(one_image_for_all_is_not_carried_on)
 {
     int like = 0;
-    (void)state;
     while (strcmp(of.rubric->image[like].name, "corner") != 0)
         like++;
     struct submitted_images *h = hand_in_same(like, 0);
@@ -288,7 +281,6 @@ TEST(bugs_have_their_parts)
     static const struct {
         const char *where, *part;
     } cases[] = {{"part 3, direct light: cos(theta)", "3"}, {"part 1, rays: generate_ray", "1"}};
-    (void)state;
     for (size_t i = 0; i < COUNT(cases); i++) {
         struct bug bug = {0};
         snprintf(bug.where, sizeof bug.where, "%s", cases[i].where);

@@ -58,7 +58,6 @@ TEST(bugs_have_their_names)
     static const char *const known[] = {"cosine_missing",  "diffuse_without_pi",
                                         "depth_one_short", "emission_twice",
                                         "sphere_far_hit",  "cosine_missing-light"};
-    (void)state;
     for (size_t i = 0; i < COUNT(known); i++) {
         int bug = bug_images_number(&of, known[i]), with, named;
         const char *found = name(0, bug, 1, 0, &with, &named);
@@ -79,7 +78,6 @@ TEST(masked_images_have_names)
     static const char *const known[] = {"upside_down", "sky_upside_down", "metal_without_shadowing",
                                         "mirror_back", "lens_square"};
     struct bug_images masked;
-    (void)state;
     assert_true(bug_images_start(&masked, "tools/rubrics/cs184-3-2.rubric"));
     assert_true(masked.rubric->mask[2] > 0);
     for (size_t i = 0; i < COUNT(known); i++) {
@@ -104,7 +102,6 @@ TEST(two_bugs_have_both_names)
                                            {"upside_down", "emission_twice"},
                                            {"diffuse_without_pi", "roulette_not_divided"},
                                            {"light_area_doubled", "roulette_squared"}};
-    (void)state;
     for (size_t i = 0; i < COUNT(known); i++) {
         int a = bug_images_number(&of, known[i][0]), b = bug_images_number(&of, known[i][1]), with;
         struct diagnosis found = find(0, a, b, 1, 0, NULL, &with);
@@ -136,7 +133,6 @@ TEST(two_bugs_that_do_not_multiply_have_both_names)
     static const char *const adds[] = {"hemisphere_in_world_frame-direct", "emission_twice-mesh"},
                              *const near[] = {"cosine_missing-light", "angle_not_halved-each"};
     double excess;
-    (void)state;
     assert_true(both_are_named(adds[0], adds[1], 1, &excess) && excess < 4);
     assert_false(both_are_named(adds[0], adds[1], 4, &excess));
     assert_true(both_are_named(near[0], near[1], -1.5, &excess) && excess > 6);
@@ -151,7 +147,6 @@ TEST(an_unknown_bug_has_no_name)
         "bvh_leaf_loses_last", "emission_twice",          "mirror_times_cosine",
         "roulette_squared",    "light_area_doubled",      "lens_centre_heavy",
         "sky_upside_down",     "gamma_in_linear_file"};
-    (void)state;
     for (size_t i = 0; i < COUNT(unknown); i++) {
         int with;
         struct diagnosis found =
@@ -165,7 +160,6 @@ TEST(an_unknown_bug_has_no_name)
 TEST(every_bug_is_in_it)
 {
     struct err e;
-    (void)state;
     if (!catalogue_current(&of.bugs.catalogue, "tests/mutants", "tests/studies/grading/bugs", &e))
         fail_msg("%s (make rubric-bugs)", e.msg);
 }
@@ -175,7 +169,6 @@ TEST(another_rubric_is_refused)
 {
     struct rubric_bugs other;
     struct err e;
-    (void)state;
     for (int i = 0; i < of.rubric->num_images; i++)
         if (strcmp(of.rubric->image[i].name, "corner") == 0) {
             of.rubric->image[i].bounces++;

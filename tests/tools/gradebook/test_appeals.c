@@ -105,7 +105,7 @@ TEST(mistakes_are_named_with_their_lines)
 TEST(what_changed_is_told)
 {
     char text[256];
-    json_t *old = grade_of(4, 0), *grade = grade_of(4, 4.5);
+    json_auto_t *old = grade_of(4, 0), *grade = grade_of(4, 4.5);
     assert_null(grade_change(NULL, grade));
     assert_null(grade_change(grade, grade));
     grade_change_text(grade, text, sizeof text);
@@ -119,6 +119,4 @@ TEST(what_changed_is_told)
     grade_change_text(grade, text, sizeof text);
     assert_string_equal(text,
                         "4.00 of 10 before; lamp not asked, now 4.50; bounces 0.00, not asked now");
-    json_decref(old);
-    json_decref(grade);
 }

@@ -191,7 +191,7 @@ static void every_file_has_documented_fields_only(void **state)
     (void)state;
     static const char *const ids[] = {"ada", "bob", "cyd"};
     struct err e;
-    json_t *grades = a_class();
+    json_auto_t *grades = a_class();
     assert_non_null(grades);
     for (int i = 0; i < 3; i++) {
         char path[256];
@@ -200,7 +200,6 @@ static void every_file_has_documented_fields_only(void **state)
     }
     if (!grade_write(dir, NULL, NULL, grades, &e))
         fail_msg("%s", e.msg);
-    json_decref(grades);
     for (int i = 0; i < 3; i++) {
         json_auto_t *root = results_of(ids[i]);
         assert_true(valid_results(root));

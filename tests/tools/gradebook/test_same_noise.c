@@ -90,7 +90,6 @@ TEST(noise_of_their_own)
     static double factor[PIXELS];
     int tests = 0, high = 0;
     double most = -INFINITY;
-    (void)state;
     for (int k = 0; k < CLASS; k++) {
         draw(factor, SPP);
         noise[k] = noise_of(factor, NULL, 0, 1.01);
@@ -116,7 +115,6 @@ TEST(noise_of_others)
 {
     static double one[PIXELS], two[PIXELS];
     double bound = same_noise_bound(300 * 299 / 2 * 20.0, 1e-3), least = INFINITY, half = INFINITY;
-    (void)state;
     for (int k = 0; k < 20; k++) {
         draw(one, SPP);
         draw(two, SPP);
@@ -211,7 +209,6 @@ TEST(copies_of_the_reference)
 TEST(too_fine_to_tell)
 {
     static double one[PIXELS], two[PIXELS];
-    (void)state;
     draw(one, 1e7);
     draw(two, 1e7);
     struct noise_print a = noise_of(one, NULL, 0, 1), b = noise_of(two, NULL, 0, 1);

@@ -1,5 +1,6 @@
 #include "odd_images.h"
 
+#include <libdeflate.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -121,17 +122,6 @@ void odd_exr_cropped(const char *path, struct odd_window data, struct odd_window
     close_file(f);
 }
 
-static uint32_t crc(const uint8_t *bytes, size_t n)
-{
-    uint32_t c = 0xffffffffu;
-    for (size_t i = 0; i < n; i++) {
-        c ^= bytes[i];
-        for (int k = 0; k < 8; k++)
-            c = c & 1 ? 0xedb88320u ^ c >> 1 : c >> 1;
-    }
-    return ~c;
-}
-
 static void put_chunk(FILE *f, const char *type, const uint8_t *data, size_t n)
 {
     uint8_t *chunk = malloc(n + 12);
@@ -141,7 +131,7 @@ static void put_chunk(FILE *f, const char *type, const uint8_t *data, size_t n)
     memcpy(chunk + 4, type, 4);
     if (n > 0)
         memcpy(chunk + 8, data, n);
-    put_be(chunk + 8 + n, crc(chunk + 4, n + 4));
+    put_be(chunk + 8 + n, libdeflate_crc32(0, chunk + 4, n + 4));
     fwrite(chunk, 1, n + 12, f);
     free(chunk);
 }
@@ -158,10 +148,10 @@ void odd_png(const char *path, int width, int height, int channels, int bits, co
     put_chunk(f, "IHDR", head, sizeof head);
     size_t bytes = (size_t)bits / 8, line = 1 + (size_t)(width * channels) * bytes;
     size_t n = line * (size_t)height;
-    uint8_t *data = calloc(n + 11, 1);
-    if (data == NULL || n > 65535)
+    uint8_t *raw = calloc(n, 1), *data = malloc(libdeflate_zlib_compress_bound(NULL, n));
+    struct libdeflate_compressor *zlib = libdeflate_alloc_compressor(1);
+    if (raw == NULL || data == NULL || zlib == NULL)
         abort();
-    uint8_t *raw = data + 7;
     for (int y = 0; y < height; y++)
         for (int i = 0; i < width * channels; i++) {
             uint16_t v = code[y * width * channels + i];
@@ -170,19 +160,14 @@ void odd_png(const char *path, int width, int height, int channels, int bits, co
                 *at++ = (uint8_t)(v >> 8);
             *at = (uint8_t)v;
         }
-    /* zlib head, one last stored block, its length and complement, and Adler-32 behind. */
-    memcpy(
-        data,
-        (uint8_t[7]){0x78, 0x01, 1, (uint8_t)n, (uint8_t)(n >> 8), (uint8_t)~n, (uint8_t)(~n >> 8)},
-        7);
-    uint32_t s1 = 1, s2 = 0;
-    for (size_t i = 0; i < n; i++) {
-        s1 = (s1 + raw[i]) % 65521;
-        s2 = (s2 + s1) % 65521;
-    }
-    put_be(raw + n, s2 << 16 | s1);
-    put_chunk(f, "IDAT", data, n + 11);
+    size_t packed =
+        libdeflate_zlib_compress(zlib, raw, n, data, libdeflate_zlib_compress_bound(zlib, n));
+    libdeflate_free_compressor(zlib);
+    if (packed == 0)
+        abort();
+    put_chunk(f, "IDAT", data, packed);
     put_chunk(f, "IEND", NULL, 0);
+    free(raw);
     free(data);
     close_file(f);
 }

@@ -59,7 +59,7 @@ TEST(test_directory)
     odd_file(test_path("runs/.hidden"), "not looked at");
     assert_refused(test_path("runs"), (struct input_options){0}, "at least 3");
     write_floats(test_path("runs/s3.exr"), 2, 1, 3, rgb_names, v[2]);
-    struct input in = read_side(test_path("runs"), (struct input_options){0}, &notes);
+    OWN(input) in = read_side(test_path("runs"), (struct input_options){0}, &notes);
     assert_int_equal(in.kind, INPUT_REPLICATES);
     assert_string_equal(in.m.unit, "replicate");
     assert_true(has_note(&notes, "3 replicates"));
@@ -70,7 +70,6 @@ TEST(test_directory)
         assert_near(in.m.m3[c], m3[c], 1e-12);
     }
     assert_near(in.m.n[0], 3, 0);
-    input_free(&in);
 
     write_floats(test_path("runs/s4.exr"), 2, 1, 3, rgb_names, v[0]);
     assert_refused(test_path("runs"), (struct input_options){0},
@@ -99,8 +98,7 @@ TEST(test_mitsuba_integrator)
     struct notes notes = {0};
     struct err e;
     write_floats(test_path("moment.exr"), 1, 1, 9, names, v);
-    struct input in =
-        read_side(test_path("moment.exr"), (struct input_options){.spp = 100}, &notes);
+    OWN(input) in = read_side(test_path("moment.exr"), (struct input_options){.spp = 100}, &notes);
     assert_int_equal(in.kind, INPUT_VARIANCE);
     assert_true(in.is_xyz && has_note(&notes, "no skewness") && has_note(&notes, "box filter"));
     static const double mean[3] = {2, 1, 3}, m2[3] = {100, 0, 400};
@@ -128,7 +126,6 @@ TEST(test_mitsuba_integrator)
     assert_true(input_pair(&in, &b, &notes, &e));
     assert_near(in.m.m3[0] / per_k3, pow(2.0 / 99, 1.5) / 2, 1e-8);
     assert_near(b.m.m3[0] / per_k3, -pow(2.0 / 99, 1.5) / 2, 1e-8);
-    input_free(&in);
     input_free(&b);
 
     assert_refused(test_path("moment.exr"), (struct input_options){0}, "--spp-a");
@@ -311,7 +308,7 @@ TEST(test_cropped)
             v[p][c] = c == 0 ? 1 : (float)(10 * p + c); /* A B G R */
     odd_exr_cropped(test_path("crop.exr"), (struct odd_window){9, 21, 3, 2},
                     (struct odd_window){10, 20, 4, 3}, "ABGR", false, v[0]);
-    struct input in = read_side(test_path("crop.exr"), (struct input_options){0}, &notes);
+    OWN(input) in = read_side(test_path("crop.exr"), (struct input_options){0}, &notes);
     assert_true(in.m.width == 4 && in.m.height == 3);
     for (int y = 0; y < 3; y++)
         for (int x = 0; x < 4; x++)
@@ -320,7 +317,6 @@ TEST(test_cropped)
                 assert_near(in.m.mean[3 * (4 * y + x) + c], y > 0 && x < 2 ? 10 * p + 3 - c : 0, 0);
             }
     assert_true(has_note(&notes, "stores 3 x 2 pixels at -1,1 of an image of 4 x 3"));
-    input_free(&in);
     odd_exr_cropped(test_path("crop.exr"), (struct odd_window){0, 0, 1, 1},
                     (struct odd_window){0, 0, 60000, 60000}, "ABGR", false, v[0]);
     assert_refused(test_path("crop.exr"), (struct input_options){0},
@@ -347,8 +343,7 @@ TEST(test_hygiene)
     odd_exr(test_path("ok.exr"), 1, 1, "ABGR", false, (float[4]){1, 1, 1, 1});
     assert_refused(test_path("ok.exr"), (struct input_options){.spp = 4}, "--spp-a");
     struct notes notes = {0};
-    struct input in = read_side(test_path("ok.exr"), none, &notes);
-    input_free(&in);
+    OWN(input) in = read_side(test_path("ok.exr"), none, &notes);
     odd_file(test_path("words.exr"), "no image");
     assert_refused(test_path("words.exr"), none, "cannot read");
     assert_refused(test_path("gone.exr"), none, "gone.exr: cannot read");
@@ -369,7 +364,7 @@ static enum verdict compare_files(const char *a, const char *b, struct notes *no
 {
     struct input in[2];
     struct err e;
-    struct comparison c;
+    OWN(comparison) c;
     struct input_options io = {.curve = "linear"};
     struct compare_options opt = {
         .alpha = 1e-3, .tile = 16, .margin_global = 0.05, .margin_tile = 0.2};
@@ -381,7 +376,6 @@ static enum verdict compare_files(const char *a, const char *b, struct notes *no
     input_limit(&in[0], opt.tile, &c);
     enum verdict v = c.verdict;
     *censored = in[0].num_censored;
-    comparison_free(&c);
     input_free(&in[0]);
     input_free(&in[1]);
     return v;
@@ -441,7 +435,7 @@ TEST(test_rounding_is_no_difference)
         struct input in[2];
         struct notes notes = {0};
         struct err e;
-        struct comparison c;
+        OWN(comparison) c;
         struct compare_options opt = {.alpha = 1e-3, .tile = 16};
         for (int i = 0; i < 2; i++)
             in[i] = read_side(test_path(i ? "b.png" : "a.png"),
@@ -449,7 +443,6 @@ TEST(test_rounding_is_no_difference)
         assert_true(input_pair(&in[0], &in[1], &notes, &e));
         MUST(compare_moments(&in[0].m, &in[1].m, &opt, &c, &e));
         assert_int_equal(c.verdict, step == 1 ? VERDICT_NOTHING_FOUND : VERDICT_DIFFERENT);
-        comparison_free(&c);
         input_free(&in[0]);
         input_free(&in[1]);
     }

@@ -41,7 +41,7 @@ TEST(rows_come_out_as_they_say)
                                            OUTCOME_AS_EXPECTED, OUTCOME_NOT_JUDGED};
     struct err e;
     char text[NOISE_CELL];
-    json_t *noise = load("", ""), *claims = noise_results_claims(noise);
+    json_auto_t *noise = load("", ""), *claims = noise_results_claims(noise);
     MUST(noise_results_check(noise, "x.json", &e));
     for (size_t i = 0; i < COUNT(outcome); i++)
         assert_int_equal(noise_results_outcome(json_array_get(noise, i)), outcome[i]);
@@ -55,8 +55,6 @@ TEST(rows_come_out_as_they_say)
     assert_near(member_number(json_array_get(claims, 0), "difference"), 0.5, 1e-12);
     assert_int_equal(results_claim_outcome(json_array_get(claims, 0)), OUTCOME_OPPOSITE);
     assert_int_equal(results_claim_outcome(json_array_get(claims, 1)), OUTCOME_NOT_JUDGED);
-    json_decref(claims);
-    json_decref(noise);
 }
 
 TEST(what_is_broken_is_refused)

@@ -76,15 +76,14 @@ static void expect_claim_rejected(json_t *claim, const char *wanted)
 TEST(round_trip)
 {
     const char *path = test_path("new/results.json");
-    json_t *root = results_of(2, (json_t *[]){judged_claim(), parse(error_claim)}), *back = NULL;
+    json_auto_t *root = results_of(2, (json_t *[]){judged_claim(), parse(error_claim)}),
+                *back = NULL;
     struct err e;
     MUST(json_write(path, root, &e));
     MUST(results_read(path, &back, &e));
     assert_true(json_equal(root, back));
     OWN_TEXT text = test_read(path);
     assert_string_equal(text + strlen(text) - 2, "}\n");
-    json_decref(back);
-    json_decref(root);
 }
 
 /* Every member that the header promises is missed by name when it is absent, and refused when it is
@@ -136,12 +135,10 @@ TEST(missing_or_mistyped_member)
         const char *path = test_path("results.json");
         json_t *claim = judged_claim();
         assert_int_equal(json_object_del(claim, m), 0);
-        json_t *root = results_of(1, &claim), *back = NULL;
+        json_auto_t *root = results_of(1, &claim), *back = NULL;
         struct err e;
         MUST(json_write(path, root, &e));
         MUST(results_read(path, &back, &e));
-        json_decref(back);
-        json_decref(root);
     }
 }
 
@@ -264,15 +261,12 @@ TEST(accepted_mdb)
                 expect_claim_rejected(claim, "'passed' contradicts 'verdict' and 'expected'");
                 continue;
             }
-            json_t *root = results_of(1, &claim), *out;
+            json_auto_t *root = results_of(1, &claim), *out;
             struct err e;
-            char *text = json_dumps(root, 0);
+            OWN_TEXT text = json_dumps(root, 0);
             test_write(test_path("results.json"), text, strlen(text));
-            free(text);
             MUST(results_read(test_path("results.json"), &out, &e));
             assert_int_equal(results_exit_code(out), passed ? 0 : 2);
-            json_decref(out);
-            json_decref(root);
         }
 }
 
@@ -360,15 +354,14 @@ TEST(tables)
                                            "tests/tools/results/table_markdown.expected"};
     json_auto_t *root = table_results();
     for (int markdown = 0; markdown < 2; markdown++) {
-        char *text = NULL, *wanted = test_read(expected[markdown]);
+        OWN_TEXT text = NULL;
+        OWN_TEXT wanted = test_read(expected[markdown]);
         size_t size;
         FILE *f = open_memstream(&text, &size);
         assert_non_null(f);
         results_table_print(f, root, markdown);
         assert_int_equal(fclose(f), 0);
         assert_string_equal(text, wanted);
-        free(text);
-        free(wanted);
     }
 }
 

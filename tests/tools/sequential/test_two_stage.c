@@ -2,6 +2,7 @@
 #include "tests/support/simulate.h"
 
 #include "tools/sequential/two_stage.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #include <gsl/gsl_cdf.h>
@@ -145,8 +146,7 @@ TEST(test_check_fresh)
     strcpy(w.a.unit, "exact");
     assert_true(two_stage_check_fresh(&w.a, &w.a, &e));
     assert_false(two_stage_check_fresh(&w.a, &w.a2, &e));
-    struct moments small = new_moments(4, 4, "sample");
+    OWN(moments) small = new_moments(4, 4, "sample");
     REFUSES(two_stage_check_fresh(&w.b, &small, &e), "4 x 4");
-    moments_free(&small);
     free_world(&w);
 }

@@ -33,14 +33,13 @@ TEST(the_shipped_scenes_keep_the_rules)
         size_t n = strlen(d->d_name);
         if (n < 4 || strcmp(d->d_name + n - 4, ".dae") != 0)
             continue;
-        char *text = read_scene(d->d_name);
+        OWN_TEXT text = read_scene(d->d_name);
         const char *told = course_scene_breach(text, strcmp(d->d_name, "sky.dae") == 0);
         /* The one that is there to be hard to split. */
         bool ok = strcmp(d->d_name, "stack.dae") == 0 ? strstr(told, "no plane") != NULL
                                                       : told[0] == '\0';
         if (!ok)
             fail_msg("%s: %s", d->d_name, told);
-        free(text);
         num++;
     }
     closedir(dir);
