@@ -1,5 +1,6 @@
 #include "bug_effect.h"
 
+#include "renderer/base/fs.h"
 #include "tests/tools/diagnose/catalogue_write.h"
 
 #include <dirent.h>
@@ -23,11 +24,10 @@ bool bug_list(const char *dir, struct catalogue *c, struct err *e)
         c->bug = calloc(MOST_BUGS, sizeof *c->bug);
     ok = ok && (c->bug != NULL || err_set(e, "out of memory"));
     for (struct dirent *entry; ok && (entry = readdir(d)) != NULL;) {
-        char path[4400];
         const char *dot = strrchr(entry->d_name, '.');
-        snprintf(path, sizeof path, "%s/%s", dir, entry->d_name);
         if (dot != NULL && strcmp(dot, ".patch") == 0 && c->num_bugs < MOST_BUGS)
-            ok = catalogue_bug_of_patch(path, &c->bug[c->num_bugs++], e);
+            ok = catalogue_bug_of_patch(fs_path("%s/%s", dir, entry->d_name).s,
+                                        &c->bug[c->num_bugs++], e);
     }
     if (d != NULL)
         closedir(d);

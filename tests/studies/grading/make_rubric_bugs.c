@@ -315,14 +315,14 @@ static bool make(struct maker *m, const char *patches, struct err *e)
     struct err none;
     if (!catalogue_read(out, &m->old, &none))
         m->old = (struct catalogue){0};
-    return work_run_all(NULL, m->made.num_bugs, make_bug, m, e) && catalogue_write(out, &m->made, e);
+    return work_run_all(NULL, m->made.num_bugs, make_bug, m, e) &&
+           catalogue_write(out, &m->made, e);
 }
 
 /* That the directory of the catalogue is not there is a mistake: it is made before. */
 static bool read_course(struct maker *m, const char *path, int variant, bool plain, struct err *e)
 {
     struct rubric_mistakes mistakes = {0};
-    char dir[2 * PATH_MAX];
     struct course *c = calloc(1, sizeof *c);
     if (c == NULL)
         return err_set(e, "out of memory");
@@ -332,8 +332,8 @@ static bool read_course(struct maker *m, const char *path, int variant, bool pla
         return false;
     if (c->rubric.bugs[0] == '\0')
         return err_set(e, "%s: no line 'bugs DIR'", path);
-    snprintf(dir, sizeof dir, "%s/%s", c->rubric.dir, c->rubric.bugs);
-    if (!fs_make_dirs(dir, e) || !rubric_read(path, &m->suite, variant, &c->rubric, &mistakes, e))
+    if (!fs_make_dirs(fs_path("%s/%s", c->rubric.dir, c->rubric.bugs).s, e) ||
+        !rubric_read(path, &m->suite, variant, &c->rubric, &mistakes, e))
         return false;
     return mistakes.num == 0 ||
            err_set(e, "%s:%d: %s", path, mistakes.at[0].line, mistakes.at[0].text);

@@ -5,6 +5,7 @@
 
 #include "renderer/base/fs.h"
 #include "tools/base/sandbox.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #include <netinet/in.h>
@@ -176,14 +177,13 @@ static void try_all(bool unsafe, bool tools)
     struct sandbox s;
     struct sandbox_result r;
     struct err e;
-    char said[8192] = "";
     if (!sandbox_open(unsafe, (const char *const[]){ref.s, NULL}, &s, &e)) {
         printf("skipped: %s\n", e.msg);
         skip();
     }
     const struct path
         out = fs_path("%s/o", s.dir.path),
-        work = fs_path("%s/w", s.dir.path),
+        work = fs_path("%s/w", s.dir.path), log = fs_path("%s/log", s.dir.path),
         make = fs_path(
             "mkdir -p %s/other %s/in && echo theirs >%s/other/tree.tar && echo mine >%s/secret && chmod -R a+rX %s/other "
             "%s/secret && tar -C %s/in -cf %s/tree.tar . && chmod 755 %s",
@@ -196,7 +196,7 @@ static void try_all(bool unsafe, bool tools)
                                     .tree = tree.s,
                                     .tools = tools,
                                     .out = out.s,
-                                    .log = fs_path("%s/log", s.dir.path).s,
+                                    .log = log.s,
                                     .limit = {.wall_s = 100,
                                               .cpu_s = 60,
                                               .memory = (size_t)1024 * MIB,
@@ -205,10 +205,7 @@ static void try_all(bool unsafe, bool tools)
                                               .processes = 64}};
     MUST(sandbox_run(&s, &job, &r, &e));
     assert_int_equal(r.end, SANDBOX_OK);
-    FILE *f = fopen(job.log, "r");
-    assert_non_null(f);
-    said[fread(said, 1, sizeof said - 1, f)] = '\0';
-    fclose(f);
+    OWN_TEXT said = test_read(job.log);
     sandbox_close(&s);
     bool no_landlock = unsafe && syscall(SYS_landlock_create_ruleset, NULL, 0, 1) < 1;
     bool no_seccomp = prctl(PR_GET_SECCOMP) < 0;

@@ -125,12 +125,10 @@ static void source_words(const char *folder, struct words *out)
     if (d == NULL)
         fail_msg("%s: no such folder", folder);
     while ((entry = readdir(d)) != NULL) {
-        char path[512];
         const char *dot = strrchr(entry->d_name, '.');
         if (dot == NULL || strcmp(dot, ".c") != 0)
             continue;
-        snprintf(path, sizeof path, "%s/%s", folder, entry->d_name);
-        OWN_TEXT text = test_read(path);
+        OWN_TEXT text = test_read(fs_path("%s/%s", folder, entry->d_name).s);
         for (const char *c = strchr(text, '"'); c != NULL; c = strchr(c + 1, '"')) {
             size_t n = name_length(c + 1);
             if (c[1 + n] == '"')

@@ -49,16 +49,16 @@ static int teardown(void **state)
 
 static void copy(const char *from_dir, const char *name, const char *to_dir, long changed_byte)
 {
-    char from[512], to[512];
-    snprintf(from, sizeof from, "%s/%s", from_dir, name);
-    snprintf(to, sizeof to, "%s/%s", to_dir, name);
-    FILE *in = fopen(from, "rb"), *out = fopen(to, "wb");
-    assert_true(in != NULL && out != NULL);
-    int byte;
-    for (long i = 0; (byte = fgetc(in)) != EOF; i++)
-        fputc(i == changed_byte ? byte ^ 1 : byte, out);
-    fclose(in);
-    assert_int_equal(fclose(out), 0);
+    const struct path to = fs_path("%s/%s", to_dir, name);
+    struct err e;
+    MUST(fs_copy(fs_path("%s/%s", from_dir, name).s, to.s, &e));
+    if (changed_byte < 0)
+        return;
+    FILE *f = fopen(to.s, "r+b");
+    assert_true(f != NULL && fseek(f, changed_byte, SEEK_SET) == 0);
+    int byte = fgetc(f);
+    assert_true(fseek(f, changed_byte, SEEK_SET) == 0 && fputc(byte ^ 1, f) != EOF);
+    assert_int_equal(fclose(f), 0);
 }
 
 static void copy_patches(const struct fixture *f, const char *to, const char *changed,
@@ -67,11 +67,9 @@ static void copy_patches(const struct fixture *f, const char *to, const char *ch
     struct err e;
     assert_true(fs_make_dirs(to, &e));
     for (int b = 0; b < f->c.num_bugs; b++) {
-        char name[80];
         const char *bug = f->c.bug[b].name;
-        snprintf(name, sizeof name, "%s.patch", bug);
         if (strcmp(bug, left_out) != 0)
-            copy(PATCHES, name, to, strcmp(bug, changed) == 0 ? 5 : -1);
+            copy(PATCHES, fs_path("%s.patch", bug).s, to, strcmp(bug, changed) == 0 ? 5 : -1);
     }
 }
 
@@ -127,10 +125,7 @@ TEST(test_a_stale_catalogue_is_refused)
     assert_false(catalogue_current(&f->c, dir, NULL, &e));
     dir = test_path("more");
     copy_patches(f, dir, "", "");
-    char name[80];
-    snprintf(name, sizeof name, "%s.patch", first);
-    copy(PATCHES, name, test_path("."), -1);
-    assert_int_equal(rename(test_path(name), test_path("more/a_new_one.patch")), 0);
+    MUST(fs_copy(fs_path(PATCHES "/%s.patch", first).s, test_path("more/a_new_one.patch"), &e));
     REFUSES(catalogue_current(&f->c, dir, NULL, &e), "a_new_one");
 }
 
@@ -139,18 +134,15 @@ TEST(test_a_damaged_catalogue_is_refused)
     struct fixture *f = *state;
     struct err e = {""};
     OWN(catalogue) c;
-    char name[160];
     const char *dir = test_path("damaged");
     assert_true(fs_make_dirs(dir, &e));
     copy(CATALOGUE, "manifest.json", dir, -1);
     assert_false(catalogue_read(dir, &c, &e)); /* no images */
     for (int v = 0; v < f->c.num_views; v++) {
-        snprintf(name, sizeof name, "%s.exr", f->c.view[v].name);
-        copy(CATALOGUE, name, dir, v == 1 ? 3000 : -1);
+        copy(CATALOGUE, fs_path("%s.exr", f->c.view[v].name).s, dir, v == 1 ? 3000 : -1);
     }
     REFUSES(catalogue_read(dir, &c, &e), f->c.view[1].name);
-    snprintf(name, sizeof name, "%s.exr", f->c.view[1].name);
-    copy(CATALOGUE, name, dir, -1);
+    copy(CATALOGUE, fs_path("%s.exr", f->c.view[1].name).s, dir, -1);
     assert_true(catalogue_read(dir, &c, &e));
 }
 

@@ -82,14 +82,13 @@ static enum approval run(struct fixture *f)
 
 static void hash(const char *dir, const char *file, char hex[65])
 {
-    char path[256];
+    const struct path path = fs_path("%s/12_plane/%s", dir, file);
     struct err e;
     memset(hex, 0, 65);
-    snprintf(path, sizeof path, "%s/12_plane/%s", dir, file);
-    if (access(path, F_OK) != 0)
+    if (access(path.s, F_OK) != 0)
         strcpy(hex, "none");
     else
-        MUST(sha256_file(path, hex, &e));
+        MUST(sha256_file(path.s, hex, &e));
 }
 
 /* Both files of the store, so that a refusal can be shown to leave them alone. */
@@ -113,9 +112,7 @@ static void assert_refused(struct fixture *f, enum approval how, const char *why
 /* The stored entry's newest change; the caller frees. */
 static json_t *last_change(struct fixture *f, size_t count)
 {
-    char path[256];
-    snprintf(path, sizeof path, "%s/12_plane/manifest.json", f->golden);
-    json_auto_t *all = json_load_file(path, 0, NULL);
+    json_auto_t *all = json_load_file(fs_path("%s/12_plane/manifest.json", f->golden).s, 0, NULL);
     json_t *changes = json_object_get(json_object_get(all, "cycles"), "changes");
     assert_int_equal(json_array_size(changes), count);
     json_t *last = json_deep_copy(json_array_get(changes, count - 1));
@@ -158,16 +155,13 @@ TEST_WITH(a_new_one_has_to_be_called_new, setup, teardown)
 TEST_WITH(an_interrupted_approval_is_ended, setup, teardown)
 {
     struct fixture *f = *state;
-    char exr[256], next[sizeof exr + 8], old[65], now[65];
-    snprintf(exr, sizeof exr, "%s/12_plane/cycles.exr", f->golden);
-    snprintf(next, sizeof next, "%s.next", exr);
+    const struct path exr = fs_path("%s/12_plane/cycles.exr", f->golden);
+    char old[65], now[65];
     render(f, f->from, 1, 2);
     render(f, f->golden, 1, 2);
     hash(f->golden, "cycles.exr", old);
-    assert_int_equal(rename(exr, next), 0);
-    FILE *stale = fopen(exr, "w");
-    assert_non_null(stale);
-    fclose(stale);
+    assert_int_equal(rename(exr.s, fs_path("%s.next", exr.s).s), 0);
+    test_write(exr.s, "", 0);
     assert_int_equal(run(f), APPROVE_UNCHANGED);
     hash(f->golden, "cycles.exr", now);
     assert_string_equal(now, old);
@@ -264,7 +258,6 @@ TEST_WITH(an_inconclusive_one_is_refused_whatever_is_said, setup, teardown)
 TEST_WITH(what_is_missing_or_damaged_is_refused, setup, teardown)
 {
     struct fixture *f = *state;
-    char path[256];
     f->opt.accept_new = true;
     f->opt.why = "I want it";
     render(f, f->golden, 1, 1);
@@ -273,14 +266,12 @@ TEST_WITH(what_is_missing_or_damaged_is_refused, setup, teardown)
     strcpy(f->scene.sha256, "def");
     assert_refused(f, APPROVE_IMPOSSIBLE, "stale candidate");
     strcpy(f->scene.sha256, "abc");
-    snprintf(path, sizeof path, "%s/12_plane/cycles.exr", f->from);
-    FILE *out = fopen(path, "ab");
+    FILE *out = fopen(fs_path("%s/12_plane/cycles.exr", f->from).s, "ab");
     fputc('x', out);
     fclose(out);
     assert_refused(f, APPROVE_IMPOSSIBLE, "damaged candidate");
     render(f, f->from, 1, 2);
-    snprintf(path, sizeof path, "%s/12_plane/cycles.exr", f->golden);
-    assert_int_equal(unlink(path), 0);
+    assert_int_equal(unlink(fs_path("%s/12_plane/cycles.exr", f->golden).s), 0);
     assert_refused(f, APPROVE_IMPOSSIBLE, "nothing to compare with");
 }
 
@@ -336,7 +327,7 @@ TEST_WITH(states_have_names_and_orphans_are_found, setup, teardown)
 static void render_twice(struct fixture *f, const char *program, struct suite_scene scene,
                          struct suite_reference ref)
 {
-    char path[4096], exr[256], hex[3][65], key[3][65];
+    char path[4096], hex[3][65], key[3][65];
     if (!process_find(program, path, sizeof path))
         skip();
     for (int i = 0; i < 3; i++) {
@@ -353,8 +344,7 @@ static void render_twice(struct fixture *f, const char *program, struct suite_sc
             !golden_write(f->from, scene.name, ref.engine, &m, manifest, &e))
             fail_msg("%s", e.msg);
         assert_string_equal(m.unit, "replicate");
-        snprintf(exr, sizeof exr, "%s/%s/%s.exr", f->from, scene.name, ref.engine);
-        assert_true(sha256_file(exr, hex[i], &e));
+        MUST(sha256_file(fs_path("%s/%s/%s.exr", f->from, scene.name, ref.engine).s, hex[i], &e));
     }
     assert_string_equal(hex[0], hex[1]);
     assert_string_equal(key[0], key[1]);

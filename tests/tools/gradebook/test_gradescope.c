@@ -124,10 +124,8 @@ static int set_up(void **state)
 
 static int tear_down(void **state)
 {
-    char command[128];
     (void)state;
-    snprintf(command, sizeof command, "rm -rf %s", dir);
-    return system(command);
+    return system(fs_path("rm -rf %s", dir).s);
 }
 
 static json_t *a_check(const char *name, double points, double of, const char *visibility)
@@ -194,9 +192,7 @@ static void every_file_has_documented_fields_only(void **state)
     json_auto_t *grades = a_class();
     assert_non_null(grades);
     for (int i = 0; i < 3; i++) {
-        char path[256];
-        snprintf(path, sizeof path, "%s/%s", dir, ids[i]);
-        assert_int_equal(mkdir(path, 0700), 0);
+        assert_int_equal(mkdir(fs_path("%s/%s", dir, ids[i]).s, 0700), 0);
     }
     if (!grade_write(dir, NULL, NULL, grades, &e))
         fail_msg("%s", e.msg);

@@ -2,6 +2,7 @@
 #include "renderer/transport/film.h"
 #include "renderer/math/sampler.h"
 #include "tools/jobs/merge.h"
+#include "renderer/base/fs.h"
 #include "tests/support/own.h"
 #include "tests/support/test.h"
 
@@ -9,9 +10,7 @@ enum { WIDTH = 4, HEIGHT = 2, MAX_SHARES = 4 };
 
 static const char *part_path(int k)
 {
-    char name[16];
-    snprintf(name, sizeof name, "part%d.exr", k);
-    return test_path(name);
+    return test_path(fs_path("part%d.exr", k).s);
 }
 
 /* Sample k of channel c at column x, row y of the full image: skewed, with an offset. */

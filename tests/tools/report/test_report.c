@@ -30,9 +30,7 @@ static struct run run_make(void)
 {
     static int runs;
     struct run r = {.claims = json_array()};
-    char name[16];
-    snprintf(name, sizeof name, "%d", runs++);
-    snprintf(r.dir, sizeof r.dir, "%.120s", test_path(name));
+    snprintf(r.dir, sizeof r.dir, "%.120s", test_path(fs_path("%d", runs++).s));
     snprintf(r.results, sizeof r.results, "%s/results.json", r.dir);
     snprintf(r.page, sizeof r.page, "%s/out/report.html", r.dir);
     return r;

@@ -9,9 +9,7 @@
 
 static const char *in_dir(const char *dir, const char *name)
 {
-    char path[128];
-    snprintf(path, sizeof path, "%s/%s", dir, name);
-    return test_path(path);
+    return test_path(fs_path("%s/%s", dir, name).s);
 }
 
 /* A claim with that difference, an interval of +-0.004 at alpha 1e-4. */

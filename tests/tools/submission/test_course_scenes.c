@@ -2,6 +2,7 @@
  * a control: a scene that breaks it, made from a shipped one by replacing some of its text. */
 
 #include "course_scene.h"
+#include "renderer/base/fs.h"
 #include "tests/support/own.h"
 #include "tests/support/test.h"
 
@@ -9,9 +10,7 @@
 
 static char *read_scene(const char *name)
 {
-    char path[300];
-    snprintf(path, sizeof path, "tools/rubrics/%s", name);
-    return test_read(path);
+    return test_read(fs_path("tools/rubrics/%s", name).s);
 }
 
 /* `text` with what lies between two of its places replaced. */
