@@ -153,7 +153,7 @@ expect "resume: damaged state" 3 "damaged" \
 interrupt() {
     rm -f "$tmp/long.exr" "$tmp/long.exr.state"
     expect "$1 ends with $2 and says how to resume" "$2" "pathtracer --resume $tmp/long.exr " \
-        timeout --preserve-status -s "$1" 2 "$pathtracer" -q -r 48 32 -s 1000000 $scene -f "$tmp/long.exr"
+        timeout --preserve-status -s "$1" 1 "$pathtracer" -q -t 2 -r 48 32 -s 1000000 $scene -f "$tmp/long.exr"
     local done
     done=$(grep -o 'after [0-9]* of' "$tmp/err" | grep -o '[0-9]*')
     expect "$1: the image has moments, and is not judged by itself" 3 "the same observations" \
@@ -462,7 +462,7 @@ for file in index.html results.json junit.xml; do
     if [ -s "$out/$file" ]; then ok "validate writes $file"; else not_ok "validate writes $file" "no"; fi
 done
 if xmllint --noout "$out/junit.xml"; then ok "junit.xml is XML"; else not_ok "junit.xml is XML" "no"; fi
-expect "a deliberate mismatch is found" 0 "DIFFERENT" $validate --only 91_albedo_2_percent
+expect "a deliberate mismatch is found" 0 "DIFFERENT" $validate --budget 5m --only 91_albedo_2_percent
 expect "validate: unknown scene" 3 "no scene" $validate --only 99_nothing
 
 # More and more samples: cheap scenes are decided with fewer than the 64 and 256 declared.
@@ -491,11 +491,11 @@ wrong() {
     chmod +x "$tmp/wrong"
 }
 wrong "exec $pathtracer \"\$@\" -m 4"
-expect "one bounce less fails" 1 "DIFFERENT" $validate --only 11_furnace --pathtracer "$tmp/wrong"
+expect "one bounce less fails" 1 "DIFFERENT" $validate --only 11_furnace/truth --pathtracer "$tmp/wrong"
 expect "one bounce less fails at the first look" 1 "DIFFERENT" \
-    $validate --until-different --only 11_furnace --pathtracer "$tmp/wrong"
+    $validate --until-different --only 11_furnace/truth --pathtracer "$tmp/wrong"
 expect "one bounce less fails twice, with fresh seeds" 1 "DIFFERENT" \
-    $validate --budget 5m --stages 2 --only 11_furnace --pathtracer "$tmp/wrong"
+    $validate --budget 5m --stages 2 --only 11_furnace/truth --pathtracer "$tmp/wrong"
 if grep -q 'with fresh seeds, confirmed' "$out/results.json"; then ok "a second stage confirms"; else
     not_ok "a second stage confirms" "$(grep '"reason"' "$out/results.json")"
 fi
@@ -513,7 +513,8 @@ expect "a missing program is not judged" 3 "nothing-here" \
 
 # Further renderers. student_tracer shares no code with ours; it reads the exported Mitsuba scene.
 engine_path=$build:$build/tests:$PATH
-student="$validate --only 12_point_plane --engine-spp 16 --engine-replicates 8"
+few="--engine-spp 16 --engine-replicates 8"
+student="$validate --only 12_point_plane $few" fake="$validate --only 12_point_plane/fake:truth $few --engine"
 expect "another renderer is judged" 0 "student *pathtracer .*EQUIVALENT *EQUIVALENT" \
     env PATH="$engine_path" $student --engine student
 # engine COMMAND [EXPRESSES]: the description of fake.sh, which is beside it.
@@ -537,16 +538,16 @@ for c in json.load(open(sys.argv[1]))["claims"]:
 verdict_of() { claims_of "$1" | awk -F '\t' -v a="$2" -v b="$3" '$1 == a && $2 == b { print $3; exit }'; }
 fake 'exec student_tracer "$@" 1.05'
 expect "a renderer that is 5 % too bright differs" 1 "fake *truth *+[45]\..*DIFFERENT *EQUIVALENT *WRONG" \
-    env PATH="$engine_path" $student --engine "$tmp/fake.json"
+    env PATH="$engine_path" $fake "$tmp/fake.json"
 # One that makes spectra of colours, and mixes them by a tenth: right in grey, so with a run for each channel.
 fake 'awk -F "\"" -v OFS="\"" "/<rgb/ { split(\$4, v, \", *\"); m = (v[1] + v[2] + v[3]) / 3
     \$4 = sprintf(\"%.9g, %.9g, %.9g\", v[1] + (m - v[1]) / 10, v[2] + (m - v[2]) / 10, v[3] + (m - v[3]) / 10) } 1" "$1" >"$1.xml"
 scene=$1.xml
 shift
 exec student_tracer "$scene" "$@"'
-expect "a renderer that mixes colours differs" 1 "fake *truth .*DIFFERENT *EQUIVALENT *WRONG" env PATH="$engine_path" $student --engine "$tmp/fake.json"
+expect "a renderer that mixes colours differs" 1 "fake *truth .*DIFFERENT *EQUIVALENT *WRONG" env PATH="$engine_path" $fake "$tmp/fake.json"
 sed 's/"expresses"/"channels": "separate", "expresses"/' "$tmp/fake.json" >"$tmp/apart.json"
-expect "and does not with each channel by itself" 0 "fake *truth .*EQUIVALENT *EQUIVALENT *ok" env PATH="$engine_path" $student --engine "$tmp/apart.json"
+expect "and does not with each channel by itself" 0 "fake *truth .*EQUIVALENT *EQUIVALENT *ok" env PATH="$engine_path" $fake "$tmp/apart.json"
 fake 'exec student_tracer "$@" 1.05'
 # The commands that the results print for each claim, of a suite and an engine whose names a shell has to be told: each judges that claim
 # again, with the verdict that it had.
@@ -564,7 +565,7 @@ done < <(claims_of "$out/first/results.json")
 tell "the $reruns printed commands judge their claims again" "$([ "$reruns" -ge 3 ] && echo "$differ" || echo "no commands")"
 bad_engine() { # NAME PATTERN SCRIPT
     fake "$3"
-    expect "a renderer that $1 is not judged" 3 "$2" $student --engine "$tmp/fake.json" --timeout 15
+    expect "a renderer that $1 is not judged" 3 "$2" $fake "$tmp/fake.json" --timeout 15
 }
 pfm='printf "PF\n64 64\n-1.0\n";'
 bad_engine "exits with 1" "exit status 1: no light" 'echo no light; exit 1'
@@ -577,7 +578,7 @@ bad_engine "writes NaN" "is not finite" "($pfm head -c 49152 /dev/zero | tr '\\0
 bad_engine "ignores its seed" "the seed has no effect" "($pfm yes abcdefg | head -c 49152) >\$4"
 rm "$tmp/fake.sh"
 expect "a renderer that is not there is not judged" 3 "fake.sh: no such program" \
-    $student --engine "$tmp/fake.json"
+    $fake "$tmp/fake.json"
 bad_description() { # NAME PATTERN
     expect "description: $1" 3 "fake.json: .*$2" \
         "$san_assay" validate --only 12_point_plane --engine "$tmp/fake.json"
@@ -595,7 +596,7 @@ expect "a renderer that can express nothing" 3 "fake can express none .*does not
     $student --engine "$tmp/fake.json"
 sed 's/"point", //' reference/engines/student.json >"$tmp/no_points.json"
 expect "what a renderer cannot express is listed" 0 "student cannot express 12_point_plane" \
-    env PATH="$engine_path" $validate --only 11_furnace --only 12_point_plane \
+    env PATH="$engine_path" $validate --only 11_furnace/student:truth --only 12_point_plane \
     --engine "$tmp/no_points.json" --engine-spp 4 --engine-replicates 3
 
 # A pixel filter of its own: the references are made with it, and another than it says is found.
@@ -612,13 +613,13 @@ expect "a pixel filter that is declared is that of both sides" 0 "^filtered has 
 expect "a wider filter than is declared is found" 1 "34_sky_constant  *filtered  *truth .* DIFFERENT" filtered gauss:0.6:2.4
 
 # Missing, stale and damaged goldens are never a pass.
-expect "missing goldens are not judged" 3 "11_furnace" $validate --only 11_furnace --golden "$tmp/none"
+expect "missing goldens are not judged" 3 "11_furnace" $validate --only 11_furnace/cycles --golden "$tmp/none"
 cp -R golden "$tmp/golden"
 printf 'x' >>"$tmp/golden/11_furnace/cycles.exr"
-expect "a damaged golden is not judged" 3 "cycles" $validate --only 11_furnace --golden "$tmp/golden"
+expect "a damaged golden is not judged" 3 "cycles" $validate --only 11_furnace/cycles --golden "$tmp/golden"
 cp -R reference/scenes "$tmp/scenes"
 echo '<!-- changed -->' >>"$tmp/scenes/11_furnace.dae"
-expect "a stale golden is not judged" 3 "11_furnace" $validate --only 11_furnace --suite "$tmp/scenes"
+expect "a stale golden is not judged" 3 "11_furnace" $validate --only 11_furnace/cycles --suite "$tmp/scenes"
 
 # golden: what may be stored. The stored goldens stand in for candidates.
 golden="$san_assay golden"
@@ -785,7 +786,7 @@ else echo "skip installed below /usr: only root can do that"; fi
 rm -rf "$installed"
 cd "$tmp" || exit 1
 expect "the installed programs work" 0 "EQUIVALENT" \
-    "$tmp/usr/bin/assay" validate -q --out "$tmp/installed" --only 11_furnace
+    "$tmp/usr/bin/assay" validate -q --out "$tmp/installed" --only 11_furnace/cycles
 expect "installed, it reads images from elsewhere" 1 "^DIFFERENT" "$tmp/usr/bin/assay" compare --curve srgb "$tmp/shallow.png" "$tmp/two.png"
 mv "$tmp/usr/lib/assay/oiio.so" "$tmp/oiio.so"
 expect "without OpenImageIO: a line" 3 "cannot load what reads images: .*oiio.so is not there" "$tmp/usr/bin/assay" compare --curve srgb "$tmp/shallow.png" "$tmp/two.png"
