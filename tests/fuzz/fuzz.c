@@ -1,15 +1,22 @@
 #include "fuzz.h"
 
+#include <errno.h>
+#include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
-static char path[64];
+static char path[64], dir[80], in_dir[112];
 
-static void remove_file(void)
+static void remove_files(void)
 {
     unlink(path);
+    if (dir[0] != '\0') {
+        unlink(in_dir);
+        rmdir(dir);
+    }
 }
 
 void fuzz_require(int ok, const char *what)
@@ -38,14 +45,28 @@ void __cyg_profile_func_exit(void *function, void *caller)
 
 const char *fuzz_file(const uint8_t *data, size_t size, const char *suffix)
 {
+    static int f; /* stays open: opening it takes longer than what is done with a small file */
     if (path[0] == '\0') {
         snprintf(path, sizeof path, "/dev/shm/assay_fuzz_%d%s", (int)getpid(), suffix);
-        atexit(remove_file);
+        atexit(remove_files);
+        f = creat(path, 0600);
     }
-    FILE *f = fopen(path, "wb");
-    fuzz_require(f != NULL && fwrite(data, 1, size, f) == size && fclose(f) == 0,
+    fuzz_require(f >= 0 && pwrite(f, data, size, 0) == (ssize_t)size &&
+                     ftruncate(f, (off_t)size) == 0,
                  "cannot write to /dev/shm");
     return path;
+}
+
+const char *fuzz_dir(const char *file, const char *name)
+{
+    if (dir[0] == '\0') {
+        snprintf(dir, sizeof dir, "%s.d", file);
+        snprintf(in_dir, sizeof in_dir, "%s/%s", dir, name);
+        fuzz_require((mkdir(dir, 0700) == 0 || errno == EEXIST) &&
+                         (symlink(file, in_dir) == 0 || errno == EEXIST),
+                     "cannot make a directory");
+    }
+    return dir;
 }
 
 void fuzz_check_line(const struct err *e, const char *name)

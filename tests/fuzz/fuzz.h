@@ -13,6 +13,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 /* A file in memory with these bytes, its name ending in `suffix`; the same name at every call of a process. */
 const char *fuzz_file(const uint8_t *data, size_t size, const char *suffix);
 
+/* A directory in which the file of fuzz_file() is called `name`. */
+const char *fuzz_dir(const char *file, const char *name);
+
 /* Aborts unless a failed call left one line that says something, and names the file where `path` is not NULL. */
 void fuzz_check_line(const struct err *e, const char *path);
 

@@ -3,38 +3,11 @@
 #include "tools/jobs/plan.h"
 #include "fuzz.h"
 
-#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
-static char dir[64];
-
-static void remove_dir(void)
-{
-    char path[96];
-    snprintf(path, sizeof path, "%s/plan.jsonl", dir);
-    unlink(path);
-    rmdir(dir);
-}
-
-/* A directory whose plan.jsonl is the file. */
-static void plan_of(const char *file)
-{
-    char path[96];
-    if (dir[0] != '\0')
-        return;
-    snprintf(dir, sizeof dir, "%s.plan", file);
-    snprintf(path, sizeof path, "%s/plan.jsonl", dir);
-    fuzz_require((mkdir(dir, 0700) == 0 || errno == EEXIST) &&
-                     (symlink(file, path) == 0 || errno == EEXIST),
-                 "cannot make a plan's directory");
-    atexit(remove_dir);
-}
-
-static void look(void)
+static void look(const char *dir)
 {
     struct plan p;
     struct err e = {""};
@@ -59,8 +32,8 @@ static void look(void)
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
-    plan_of(fuzz_file(data, size, ".jsonl"));
-    look();
+    const char *dir = fuzz_dir(fuzz_file(data, size, ".jsonl"), "plan.jsonl");
+    look(dir);
     int jobs = 1;
     for (size_t i = 0; i < size; i++)
         jobs += data[i] == '\n' && i + 1 < size;
@@ -74,6 +47,6 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     memcpy(whole + n, data, size);
     fuzz_file((const uint8_t *)whole, (size_t)n + size, ".jsonl");
     free(whole);
-    look();
+    look(dir);
     return 0;
 }

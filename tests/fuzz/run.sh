@@ -42,8 +42,7 @@ fuzz_one() {
     else
         corpus=$dir/$name.corpus options=(-max_total_time="$seconds")
     fi
-    mkdir -p "$corpus" "$dir/$name.seeds" "$dir/$name.files"
-    export FUZZ_DIR=$dir/$name.files # for what reads more than one file
+    mkdir -p "$corpus" "$dir/$name.seeds"
     seeds "$name" | xargs cp -t "$dir/$name.seeds" || return 1
     places=("$corpus" "$dir/$name.seeds")
     [ -d "tests/fuzz/found/$name" ] && places+=("tests/fuzz/found/$name")
