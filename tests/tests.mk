@@ -120,10 +120,15 @@ order: all
 	tests/lint/order.sh $(BUILD)
 # A file is looked at again when it or any header changes. One file for each process: with several, clang-tidy 14 takes
 # every va_list but the first file's for one that was never started. Of a kernel the paths are followed for one instruction set,
-# as only its intrinsics differ in the others.
+# as only its intrinsics differ in the others. Paths are followed twice, through the functions that are called, and in each
+# function by itself. Of 125 faults planted in the functions with most paths this finds 65, clang's default (225000 nodes, through calls) 60
+# in two and a half times the time.
+PATHS := max-nodes=50000 ipa=none,max-nodes=5000
 define clang_tidy
 	$(call say,TIDY,$<)
-	$(Q)mkdir -p $(@D); clang-tidy --quiet $(2) $< -- -std=c17 -I. -D_XOPEN_SOURCE=700 $(pkg_cflags) $(1) >$@.log 2>&1 || { cat $@.log; exit 1; }; touch $@
+	$(Q)mkdir -p $(@D); for paths in $(if $(2),max-nodes=1,$(PATHS)); do \
+	  clang-tidy --quiet $(2) $< -- -std=c17 -I. -D_XOPEN_SOURCE=700 $(pkg_cflags) $(1) -Xclang -analyzer-config -Xclang $$paths >$@.log 2>&1 || \
+	    { cat $@.log; exit 1; }; done; touch $@
 endef
 $(patsubst %,$(BUILD)/lint/%.ok,$(LINT)): $(BUILD)/lint/%.ok: % .clang-tidy $(HEADERS) | $(BUILD)/deps-lint
 	$(call clang_tidy,-DASSAY_VERSION='""' -DASSAY_COMMIT='""')
@@ -137,7 +142,8 @@ cppcheck = cppcheck --enable=warning,performance,portability --std=c11 --quiet -
   --suppressions-list=.cppcheck-suppressions -I. -D_XOPEN_SOURCE=700 -DISA=avx2 -DLANES=8 --include=tests/lint/jansson.h
 $(BUILD)/lint/planted.ok: tests/lint/planted.c tests/lint/jansson.h .clang-tidy .cppcheck-suppressions | $(BUILD)/deps-lint
 	$(Q)mkdir -p $(@D); ! $(cppcheck) $< 2>/dev/null || { echo 'cppcheck does not see a planted fault' >&2; exit 1; }
-	$(Q)! clang-tidy --quiet $< -- -std=c17 $(pkg_cflags) >/dev/null 2>&1 || { echo 'clang-tidy does not see a planted fault' >&2; exit 1; }
+	$(Q)for paths in $(PATHS); do ! clang-tidy --quiet $< -- -std=c17 $(pkg_cflags) -Xclang -analyzer-config -Xclang $$paths >/dev/null 2>&1 || \
+	  { echo 'clang-tidy does not see a planted fault' >&2; exit 1; }; done
 	$(Q)touch $@
 $(BUILD)/lint/cppcheck.ok: $(BUILD)/lint/planted.ok $(LINT) $(HEADERS) $(wildcard tests/*/*.[ch] tests/*/*/*.[ch])
 	$(call say,CHECK,cppcheck)

@@ -236,8 +236,8 @@ static bool check_mesh(struct check *c, const json_t *mesh, struct err *e)
     const char *name = json_string_value(json_object_get(mesh, "name"));
     if (name == NULL || !json_is_array(sizes) || !json_is_array(corners))
         return err_set(e, "blender_import.py: a mesh without its members");
-    point *places = malloc(LARGEST_POLYGON * sizeof *places);
-    point *directions = malloc(LARGEST_POLYGON * sizeof *directions);
+    point *places = calloc(LARGEST_POLYGON, sizeof *places);
+    point *directions = calloc(LARGEST_POLYGON, sizeof *directions);
     uint32_t *vertex = malloc(LARGEST_POLYGON * sizeof *vertex);
     bool ok = (places != NULL && directions != NULL && vertex != NULL) ||
               err_set(e, "import check: out of memory");
