@@ -12,6 +12,12 @@ bool same(double a, double b)
     return fabs(a - b) <= 1e-9 * fabs(b);
 }
 
+double next_number(uint64_t *state)
+{
+    *state = *state * 6364136223846793005u + 1442695040888963407u;
+    return (double)(*state >> 11) / 9007199254740992.0;
+}
+
 struct integrand {
     double (*f)(double x, double z, const void *ctx);
     const void *ctx;

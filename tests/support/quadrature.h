@@ -9,6 +9,9 @@
 /* Equal to 1e-9 of b: what closed forms have to reach, and what their negative controls must miss. */
 bool same(double a, double b);
 
+/* A fixed sequence of numbers in [0,1). */
+double next_number(uint64_t *state);
+
 /* Integral of f over x[0]..x[1] by z[0]..z[1], nested and adaptive (GSL's CQUAD, which stands
  * kinks), to about 1e-11.
  * Fails the test where it does not converge. */

@@ -1,4 +1,5 @@
 #include "sky.h"
+#include "build_scene.h"
 #include "test.h"
 
 #include <gsl/gsl_integration.h>
@@ -19,11 +20,7 @@ struct sky sky_uneven(int width, int height)
 
 struct image sky_image(const struct sky *s)
 {
-    static const char *const NAMES[] = {"R", "G", "B"};
-    struct image im;
-    struct err e = {""};
-    if (!image_alloc(&im, s->width, s->height, 3, NAMES, &e))
-        fail_msg("%s", e.msg);
+    struct image im = build_image(s->width, s->height);
     for (int i = 0; i < s->width * s->height; i++)
         for (int c = 0; c < 3; c++)
             im.data[3 * i + c] = s->value[i] * (float)(c + 1);
@@ -36,8 +33,7 @@ struct environment *sky_environment(const struct sky *s)
     struct image im = sky_image(s);
     struct environment *env = environment_from_image(&im, "sky", &e);
     image_free(&im);
-    if (env == NULL)
-        fail_msg("%s", e.msg);
+    MUST(env != NULL);
     return env;
 }
 

@@ -2,7 +2,6 @@
  * find; and then with Blender, where there is one. */
 #include "reference/import_check/import_check.h"
 #include "reference/base/process.h"
-#include "renderer/base/fs.h"
 #include "tools/validate/import_result.h"
 #include "tests/support/build_scene.h"
 #include "tests/support/test.h"
@@ -52,7 +51,6 @@ static void add_light(struct fixture *f, const char *kind, vec3 position, vec3 d
  * sphere, and a light of each kind; then the dump that Blender would have written. */
 static void make(struct fixture *f, char axis)
 {
-    struct err e;
     *f = (struct fixture){.axis = axis, .s = build_scene()};
     uint32_t grey_one = build_material(&f->s, grey(.5f), grey(0));
     uint32_t lamp = build_material(&f->s, grey(0), grey(10));
@@ -65,8 +63,7 @@ static void make(struct fixture *f, char axis)
     build_spot(&f->s, v3(-.5f, 1, 0), v3(0, -.6f, .8f), .5f, 0, grey(1));
     build_sun(&f->s, v3(.6f, .8f, 0), grey(1));
     build_camera(&f->s, v3(.1f, 1, 4), 45);
-    if (!scene_finish(&f->s, "test", &e) || !camera_init(&f->c, &f->s, 60, 40, &e))
-        fail_msg("%s", e.msg);
+    f->c = build_finish(&f->s, 60, 40);
     char up[] = "?_UP";
     up[0] = axis;
     f->dump = json_pack("{s:s, s:i, s:[{s:s, s:b, s:[], s:[], s:[]}], s:[], s:[]}", "up_axis", up,
@@ -91,6 +88,22 @@ static void free_all(struct fixture *f)
     json_decref(f->dump);
     scene_free(&f->s);
 }
+
+static int set_up(void **state)
+{
+    static struct fixture f;
+    make(&f, 'Y');
+    *state = &f;
+    return 0;
+}
+
+static int tear_down(void **state)
+{
+    free_all(*state);
+    return 0;
+}
+
+#define WITH_Y_UP(name) TEST_OF(fixture, name, set_up, tear_down)
 
 static struct import_report compare(struct fixture *f)
 {
@@ -119,6 +132,7 @@ TEST(readers_that_agree)
     }
 }
 
+/* Readers that differ, for that reason; the fixture is as it was made again. */
 static void assert_differ(struct fixture *f, const char *why)
 {
     struct import_report r = compare(f);
@@ -127,127 +141,108 @@ static void assert_differ(struct fixture *f, const char *why)
     if (strstr(r.what, why) == NULL)
         fail_msg("'%s' does not say '%s'", r.what, why);
     free_all(f);
+    make(f, 'Y');
+}
+
+static json_t *first_mesh(const struct fixture *f)
+{
+    return json_array_get(json_object_get(f->dump, "meshes"), 0);
 }
 
 /* 1e-4 of the extent; the least that is allowed is 1e-5. */
-TEST(a_shifted_vertex_is_found)
+WITH_Y_UP(a_shifted_vertex_is_found)
 {
-    struct fixture f;
-    make(&f, 'Y');
-    double extent = (double)length(sub(f.s.bounds_max, f.s.bounds_min));
-    f.s.position[6].y += (float)(1e-4 * extent); /* of the wall */
-    assert_differ(&f, "polygon 1: Blender has a corner at (2.00000, 0.00000, -1.00000)");
-    make(&f, 'Y');
-    f.s.position[1].x +=
-        (float)(1e-4 * extent); /* of the floor, of which each corner counts once */
-    assert_differ(&f, "polygon 0");
+    double extent = (double)length(sub(f->s.bounds_max, f->s.bounds_min));
+    f->s.position[6].y += (float)(1e-4 * extent); /* of the wall */
+    assert_differ(f, "polygon 1: Blender has a corner at (2.00000, 0.00000, -1.00000)");
+    /* of the floor, of which each corner counts once */
+    f->s.position[1].x += (float)(1e-4 * extent);
+    assert_differ(f, "polygon 0");
 }
 
-TEST(a_swapped_axis_is_found)
+WITH_Y_UP(a_swapped_axis_is_found)
 {
-    struct fixture f;
-    make(&f, 'Y');
-    for (uint32_t k = 0; k < 3 * f.s.num_triangles; k++) {
-        vec3 *p = &f.s.position[k];
+    for (uint32_t k = 0; k < 3 * f->s.num_triangles; k++) {
+        vec3 *p = &f->s.position[k];
         *p = v3(p->z, p->y, p->x);
     }
-    assert_differ(&f, "polygon 0");
-    make(&f, 'Z'); /* the file said Z up, and one of the two has not read that */
-    json_object_set_new(f.dump, "up_axis", json_string("Y_UP"));
-    assert_differ(&f, "polygon 0");
+    assert_differ(f, "polygon 0");
+    free_all(f);
+    make(f, 'Z'); /* the file said Z up, and one of the two has not read that */
+    json_object_set_new(f->dump, "up_axis", json_string("Y_UP"));
+    assert_differ(f, "polygon 0");
 }
 
-TEST(triangles_too_many_too_few_or_turned_are_found)
+WITH_Y_UP(triangles_too_many_too_few_or_turned_are_found)
 {
-    struct fixture f;
-    make(&f, 'Y');
-    vec3 p = f.s.position[7];
-    f.s.position[7] = f.s.position[8];
-    f.s.position[8] = p;
-    assert_differ(&f, "polygon 1: our triangles do not make it up");
-    make(&f, 'Y');
+    vec3 p = f->s.position[7];
+    f->s.position[7] = f->s.position[8];
+    f->s.position[8] = p;
+    assert_differ(f, "polygon 1: our triangles do not make it up");
     const vec3 more[3] = {{-1, 0, 1}, {1, 0, 1}, {2, 1.5f, 0}};
-    add_polygon(&f, 3, more, v3(0, 1, 0));
-    assert_differ(&f, "polygon 2: our triangles do not make it up");
-    make(&f, 'Y');
-    json_t *mesh = json_array_get(json_object_get(f.dump, "meshes"), 0);
-    json_array_remove(json_object_get(mesh, "sizes"), 1);
-    assert_differ(&f, "1 triangles of ours are none of Blender's");
+    add_polygon(f, 3, more, v3(0, 1, 0));
+    assert_differ(f, "polygon 2: our triangles do not make it up");
+    json_array_remove(json_object_get(first_mesh(f), "sizes"), 1);
+    assert_differ(f, "1 triangles of ours are none of Blender's");
 }
 
-TEST(a_turned_normal_is_found)
+WITH_Y_UP(a_turned_normal_is_found)
 {
-    struct fixture f;
-    make(&f, 'Y');
-    f.s.normal[6] = normalize(v3(-1, 1e-3f, 0));
-    assert_differ(&f, "normal at (2.0000, 0.0000, -1.0000): 0.0010 rad");
-    make(&f, 'Y'); /* where Blender rounds, that much passes, but not a degree and a half */
-    json_t *mesh = json_array_get(json_object_get(f.dump, "meshes"), 0);
-    json_object_set_new(mesh, "custom", json_true());
-    f.s.normal[6] = normalize(v3(-1, 1e-3f, 0));
-    assert_true(compare(&f).agrees);
-    f.s.normal[6] = normalize(v3(-1, .026f, 0));
-    assert_differ(&f, "0.0260 rad");
+    f->s.normal[6] = normalize(v3(-1, 1e-3f, 0));
+    assert_differ(f, "normal at (2.0000, 0.0000, -1.0000): 0.0010 rad");
+    /* where Blender rounds, that much passes, but not a degree and a half */
+    json_object_set_new(first_mesh(f), "custom", json_true());
+    f->s.normal[6] = normalize(v3(-1, 1e-3f, 0));
+    assert_true(compare(f).agrees);
+    f->s.normal[6] = normalize(v3(-1, .026f, 0));
+    assert_differ(f, "0.0260 rad");
 }
 
-TEST(another_camera_is_found)
+WITH_Y_UP(another_camera_is_found)
 {
-    struct fixture f;
-    make(&f, 'Y');
-    f.c.tan_h = tanf(1.01f * 3.14159265f / 8); /* an angle of view 1 % larger */
-    assert_differ(&f, "angle of view");
-    make(&f, 'Y');
-    f.c.eye.z += 1e-3f;
-    assert_differ(&f, "camera: ");
-    make(&f, 'Y');
-    f.c.right = v3(1, 1e-4f, 0);
-    assert_differ(&f, "'right' is 0.0001 rad");
-    make(&f, 'Y');
-    json_array_clear(json_object_get(f.dump, "cameras"));
-    assert_differ(&f, "Blender has 0 cameras");
+    f->c.tan_h = tanf(1.01f * 3.14159265f / 8); /* an angle of view 1 % larger */
+    assert_differ(f, "angle of view");
+    f->c.eye.z += 1e-3f;
+    assert_differ(f, "camera: ");
+    f->c.right = v3(1, 1e-4f, 0);
+    assert_differ(f, "'right' is 0.0001 rad");
+    json_array_clear(json_object_get(f->dump, "cameras"));
+    assert_differ(f, "Blender has 0 cameras");
 }
 
-TEST(lights_that_moved_or_turned_are_found)
+WITH_Y_UP(lights_that_moved_or_turned_are_found)
 {
-    struct fixture f;
-    make(&f, 'Y');
-    f.s.lights[0].position.x += 1e-3f;
-    assert_differ(&f, "Blender's light 'a light' (POINT) is none of ours");
-    make(&f, 'Y');
-    f.s.lights[1].axis = v3(0, -.8f, .6f);
-    assert_differ(&f, "(SPOT) is none of ours");
-    make(&f, 'Y');
-    f.s.lights[2].to_light = v3(-.6f, .8f, 0);
-    assert_differ(&f, "(SUN) is none of ours");
-    make(&f, 'Y');
-    json_array_remove(json_object_get(f.dump, "lights"), 1);
-    assert_differ(&f, "light 1 of ours is none of Blender's");
-    make(&f, 'Y'); /* the point light that stands for the rectangle */
-    json_array_remove(json_object_get(f.dump, "lights"), 3);
-    assert_differ(&f, "2 triangles of ours are none of Blender's");
-    make(&f, 'Y'); /* ambient light is not an excuse for any sun */
-    add_light(&f, "SUN", v3(0, 0, 0), v3(0, 1, 0));
-    json_object_set_new(f.dump, "num_ambient", json_integer(1));
-    assert_differ(&f, "(SUN) is none of ours");
+    f->s.lights[0].position.x += 1e-3f;
+    assert_differ(f, "Blender's light 'a light' (POINT) is none of ours");
+    f->s.lights[1].axis = v3(0, -.8f, .6f);
+    assert_differ(f, "(SPOT) is none of ours");
+    f->s.lights[2].to_light = v3(-.6f, .8f, 0);
+    assert_differ(f, "(SUN) is none of ours");
+    json_array_remove(json_object_get(f->dump, "lights"), 1);
+    assert_differ(f, "light 1 of ours is none of Blender's");
+    /* the point light that stands for the rectangle */
+    json_array_remove(json_object_get(f->dump, "lights"), 3);
+    assert_differ(f, "2 triangles of ours are none of Blender's");
+    /* ambient light is not an excuse for any sun */
+    add_light(f, "SUN", v3(0, 0, 0), v3(0, 1, 0));
+    json_object_set_new(f->dump, "num_ambient", json_integer(1));
+    assert_differ(f, "(SUN) is none of ours");
 }
 
-TEST(what_cannot_be_compared_is_no_agreement)
+WITH_Y_UP(what_cannot_be_compared_is_no_agreement)
 {
-    struct fixture f;
     struct import_report r;
     struct err e;
-    make(&f, 'Y');
-    json_object_set_new(f.dump, "error", json_string("the importer ended with CANCELLED"));
-    REFUSES(import_check_compare(&f.s, &f.c, f.dump, &r, &e), "CANCELLED");
-    json_object_del(f.dump, "error");
-    json_object_del(f.dump, "lights");
-    assert_false(import_check_compare(&f.s, &f.c, f.dump, &r, &e));
-    free_all(&f);
-    make(&f, 'Y');
-    json_t *mesh = json_array_get(json_object_get(f.dump, "meshes"), 0);
-    json_array_append_new(json_object_get(mesh, "sizes"), json_integer(3)); /* without corners */
-    assert_false(import_check_compare(&f.s, &f.c, f.dump, &r, &e));
-    free_all(&f);
+    json_object_set_new(f->dump, "error", json_string("the importer ended with CANCELLED"));
+    REFUSES(import_check_compare(&f->s, &f->c, f->dump, &r, &e), "CANCELLED");
+    json_object_del(f->dump, "error");
+    json_object_del(f->dump, "lights");
+    assert_false(import_check_compare(&f->s, &f->c, f->dump, &r, &e));
+    free_all(f);
+    make(f, 'Y');
+    json_array_append_new(json_object_get(first_mesh(f), "sizes"),
+                          json_integer(3)); /* without corners */
+    assert_false(import_check_compare(&f->s, &f->c, f->dump, &r, &e));
     json_t *reports = json_pack("[{s:s, s:b}]", "scene", "x", "agrees", 1);
     assert_int_equal(import_result_exit_code(reports), 0);
     json_array_append_new(reports,
@@ -262,31 +257,29 @@ TEST(what_cannot_be_compared_is_no_agreement)
  * triangle), the tent and its mirror image 2 each; 3 normals each; three lights with a place or a direction. */
 TEST(blender_reads_what_we_read)
 {
-    char path[4096], dir[] = "/tmp/test_import.XXXXXX";
+    char path[4096];
     if (!process_find("blender", path, sizeof path))
         skip();
-    assert_non_null(mkdtemp(dir));
     struct suite_scene suite = {.name = "import",
                                 .dae = "tests/reference/import_check/import.dae",
                                 .width = 60,
                                 .height = 40,
                                 .depth = 1};
     const struct suite_scene *scenes[] = {&suite};
-    const struct import_options opt = {.work_dir = dir, .share_dir = "reference", .timeout_s = 300};
+    const struct import_options opt = {
+        .work_dir = test_path("."), .share_dir = "reference", .timeout_s = 300};
     json_t *dumps;
     struct err e;
     struct fixture f = {.axis = 'Z'};
     struct import_report r;
-    if (!import_check_run(scenes, 1, &opt, &dumps, &e))
-        fail_msg("%s", e.msg);
+    MUST(import_check_run(scenes, 1, &opt, &dumps, &e));
     if (json_object_get(json_array_get(dumps, 0), "absent") != NULL) {
         json_decref(dumps);
         print_message("skipped: this Blender does not import COLLADA\n");
         skip();
     }
-    if (!suite_open(&suite, &f.s, &f.c, &e) ||
-        !import_check_compare(&f.s, &f.c, json_array_get(dumps, 0), &r, &e))
-        fail_msg("%s", e.msg);
+    MUST(suite_open(&suite, &f.s, &f.c, &e) &&
+         import_check_compare(&f.s, &f.c, json_array_get(dumps, 0), &r, &e));
     if (!r.agrees)
         fail_msg("%s", r.what);
     assert_int_equal(r.triangles, 2 + 4 + 1 + 2 + 2);
@@ -306,5 +299,4 @@ TEST(blender_reads_what_we_read)
     assert_false(r.agrees);
     json_decref(dumps);
     scene_free(&f.s);
-    assert_true(fs_remove_tree(dir, &e));
 }

@@ -98,7 +98,7 @@ TEST(the_text_is_that_of_the_description)
     struct err e;
     struct scene s = build_scene();
     for (size_t i = 0; i < COUNT(all); i++)
-        s.materials[build_material(&s, grey(0), grey(0))] = all[i];
+        build_like(&s, all[i]);
     build_quad(&s, v3(-1, 0, -5), v3(2, 0, 0), v3(0, 3, 0.5f), 0);
     build_triangle(&s, v3(0, 0, -4), v3(1, 0, -4), v3(0, 1, -4.5f), 1);
     build_triangle(&s, v3(0, 0, -3), v3(1, 0, -3), v3(0, 1, -3.5f), 3);
@@ -162,12 +162,10 @@ static struct scene lit_by(struct light l)
 
 TEST(environment_images)
 {
-    static const char *const names[3] = {"R", "G", "B"};
     /* to_world of environment.xml.expected */
     const double m[16] = {0, 0, 1, 0, 0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 0, 1};
     struct err e;
-    struct image im;
-    assert_true(image_alloc(&im, 6, 5, 3, names, &e));
+    struct image im = build_image(6, 5);
     srand(7);
     for (int i = 0; i < 6 * 5 * 3; i++)
         im.data[i] = (float)(rand() % 1000) / 100;
@@ -222,9 +220,7 @@ TEST(what_it_has_not_is_refused)
     };
     for (size_t i = 0; i < COUNT(bad); i++) {
         struct scene s = build_scene();
-        uint32_t m = build_material(&s, grey(0), grey(0));
-        s.materials[m] = bad[i].m;
-        build_triangle(&s, v3(0, 0, -4), v3(1, 0, -4), v3(0, 1, -4), m);
+        build_triangle(&s, v3(0, 0, -4), v3(1, 0, -4), v3(0, 1, -4), build_like(&s, bad[i].m));
         build_camera(&s, v3(0, 0, 0), 50);
         refuse(&s, NULL, bad[i].pattern);
     }

@@ -46,7 +46,7 @@ TEST(the_text_is_that_of_the_description)
     struct err e;
     struct scene s = build_scene();
     for (size_t i = 0; i < COUNT(all); i++)
-        s.materials[build_material(&s, grey(0), grey(0))] = all[i];
+        build_like(&s, all[i]);
     build_quad(&s, v3(-1, 0, -5), v3(2, 0, 0), v3(0, 3, 0.5f), 0);
     build_triangle(&s, v3(0, 0, -3), v3(1, 0, -3), v3(0, 1, -3.5f), 6);
     s.normal[7] = normalize(v3(.3f, .4f, 1));
@@ -74,8 +74,7 @@ TEST(the_text_is_that_of_the_description)
 static struct scene triangle_of(struct material m)
 {
     struct scene s = build_scene();
-    s.materials[build_material(&s, grey(0), grey(0))] = m;
-    build_triangle(&s, v3(0, 0, -4), v3(1, 0, -4), v3(0, 1, -4), 0);
+    build_triangle(&s, v3(0, 0, -4), v3(1, 0, -4), v3(0, 1, -4), build_like(&s, m));
     build_camera(&s, v3(0, 0, 0), 50);
     return s;
 }
@@ -149,10 +148,8 @@ static bool is_around(const struct environment *sky, vec3 w, float texel)
 
 TEST(environment_images)
 {
-    static const char *const names[3] = {"R", "G", "B"};
     struct err e;
-    struct image im, got;
-    assert_true(image_alloc(&im, 6, 5, 3, names, &e));
+    struct image im = build_image(6, 5), got;
     srand(7);
     for (int i = 0; i < 6 * 5 * 3; i++)
         im.data[i] = (float)(rand() % 1000) / 100;
@@ -210,7 +207,7 @@ TEST(environment_images)
     }
     image_free(&im);
     image_free(&got);
-    assert_true(image_alloc(&im, 1, 513, 3, names, &e));
+    im = build_image(1, 513);
     im.data[0] = 1;
     struct scene tall = triangle_of((struct material){.reflectance = {1, 1, 1}});
     assert_true(scene_add_environment(&tall, environment_from_image(&im, "test", &e), &e));

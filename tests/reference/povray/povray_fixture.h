@@ -2,6 +2,7 @@
 #ifndef ASSAY_POVRAY_FIXTURE_H
 #define ASSAY_POVRAY_FIXTURE_H
 
+#include "reference/povray/export_povray.h"
 #include "reference/povray/povray_driver.h"
 
 /* POV-Ray sleeps through most of the 0.7 s that a small image takes. */
@@ -21,8 +22,11 @@ struct fixture {
 /* Takes over the scene and completes it. Two replicates of subgrid 1. Aborts the test on failure. */
 void fixture_init(struct fixture *f, struct scene s, int size, int depth);
 void fixture_free(struct fixture *f);
-/* POV-Ray's image; aborts the test if there is none. */
+/* POV-Ray's image; aborts the test if there is none. Of a NULL manifest nothing is told. */
 struct moments must_render(struct fixture *f, json_t *manifest);
+/* The scene as POV-Ray gets it; the caller frees. */
+char *povray_text(const struct scene *s, const struct camera *c, int depth,
+                  const struct povray_variant *v);
 /* Looks straight down at the plane y = 0 from height h; the image is 2 h x 2 h wide. */
 void look_down(struct scene *s, float h);
 /* Skips the test, and says so, where there is none. */

@@ -5,6 +5,7 @@
 
 #include "reference/povray/povray_lamp.h"
 #include "reference/povray/povray_replicate_parts.h"
+#include "povray_fixture.h"
 #include "tests/support/test.h"
 
 #include <gsl/gsl_math.h>
@@ -34,20 +35,6 @@ static struct povray_passes plan(struct scene *s, int depth)
     return p;
 }
 
-/* The exported text; the caller frees. Inlined, gcc 12 takes what it returns for a pointer into its frame. */
-static __attribute__((noinline)) char *text_of(const struct scene *s, const struct camera *c,
-                                               int depth, const struct povray_variant *v)
-{
-    struct err e;
-    char *text = NULL;
-    size_t size;
-    FILE *f = open_memstream(&text, &size);
-    assert_non_null(f);
-    MUST(export_povray(s, c, depth, v, f, &e));
-    assert_int_equal(fclose(f), 0);
-    return text;
-}
-
 /* Three numbers that follow `key` and a "<". */
 static void numbers_after(const char *text, const char *key, double x[3])
 {
@@ -64,7 +51,7 @@ TEST(test_recursion)
     static const struct {
         int depth, recursion;
     } sources[] = {{0, 0}, {1, 0}, {2, 1}, {5, 4}, {21, 20}};
-    for (size_t i = 0; i < sizeof sources / sizeof *sources; i++) {
+    for (size_t i = 0; i < COUNT(sources); i++) {
         struct scene s = floor_and_ball(true);
         struct povray_passes p = plan(&s, sources[i].depth);
         assert_int_equal(p.num_passes, 1);
@@ -161,7 +148,7 @@ TEST(test_normals_refused)
 TEST(test_lights_refused)
 {
     static const float falloff[][3] = {{0, 1, 0}, {1, 0, 1}, {1, 1, 0}};
-    for (size_t i = 0; i < sizeof falloff / sizeof *falloff; i++) {
+    for (size_t i = 0; i < COUNT(falloff); i++) {
         struct scene s = floor_and_ball(false);
         struct light l = {.kind = LIGHT_POINT, .value = {1, 1, 1}, .position = {0, 1, 0}};
         memcpy(l.attenuation, falloff[i], sizeof l.attenuation);
@@ -177,7 +164,6 @@ TEST(test_lights_refused)
     scene_free(&tinted);
 }
 
-/* All ways to cut a parallelogram and to number its corners give the same set of points. */
 /* Two texels along u, mirrored, on coordinates 0 .. 1.5 times 2: texels 0 to 3 and one more to each side, the fourth of which is the
  * first again. Nearest has each colour from edge to edge, bilinear once, at its centre. The lamp with a texture is none. */
 TEST(test_textures)
@@ -193,7 +179,7 @@ TEST(test_textures)
         struct camera c = build_finish(&s, 40, 30);
         assert_false(povray_lamp(&s, &s.lights[0], &lamp));
         const struct povray_variant v = povray_variant_plain();
-        char *text = text_of(&s, &c, 1, &v);
+        char *text = povray_text(&s, &c, 1, &v);
         static const char *const parts[2][4] = {
             {"function { x*0.33333333333333331 - -0.16666666666666666 } color_map {\n      [0.0833333333 rgb <0.375,0.5,0.5>] "
              "[0.25 rgb <0.375,0.5,0.5>] [0.416666667 rgb <2.25,1,0.25>] [0.583333333 rgb <2.25,1,0.25>]\n      "
@@ -247,6 +233,7 @@ TEST(test_textures_refused)
     }
 }
 
+/* All ways to cut a parallelogram and to number its corners give the same set of points. */
 TEST(test_lamp_any_numbering)
 {
     const vec3 corner[4] = {{0, 1, 0}, {.5f, 1.25f, 0}, {.75f, 1.25f, 1}, {.25f, 1, 1}};
@@ -259,9 +246,7 @@ TEST(test_lamp_any_numbering)
             int i = turn % 3, j = turn / 3;
             build_triangle(&s, first[i], first[(i + 1) % 3], first[(i + 2) % 3], m);
             build_triangle(&s, second[j], second[(j + 1) % 3], second[(j + 2) % 3], m);
-            s.num_objects--; /* one object of both */
-            s.objects[s.num_objects - 1].num_triangles = 2;
-            s.tri_object[s.num_triangles - 1]--;
+            build_join(&s, s.num_objects - 2);
             build_finish(&s, 40, 30);
             struct povray_lamp l;
             assert_int_equal(s.num_lights, 1);
@@ -312,7 +297,7 @@ TEST(test_lamp_points)
         v.lamp_cells = 6;
         v.rule = jitter ? POVRAY_JITTER : POVRAY_GAUSS;
         v.lamp_seed = 77;
-        char *text = text_of(&s, &c, 1, &v);
+        char *text = povray_text(&s, &c, 1, &v);
         double x[3], sum[3] = {0}, square[3] = {0};
         int n = 0, cell[36] = {0};
         for (const char *at = text; (at = strstr(at, "Lamp0(<")) != NULL; at++, n++) {
@@ -353,7 +338,7 @@ TEST(test_jitter_follows_seed)
     char *text[3];
     for (int i = 0; i < 3; i++) {
         v.lamp_seed = i == 2 ? 6 : 5;
-        text[i] = text_of(&s, &c, 1, &v);
+        text[i] = povray_text(&s, &c, 1, &v);
     }
     assert_string_equal(text[0], text[1]);
     assert_string_not_equal(text[0], text[2]);
@@ -401,7 +386,7 @@ TEST(test_rotation)
             memcpy(v.rotation, r, sizeof r);
         }
         v.roulette = 0;
-        text[by_hand] = text_of(&s, &c, 5, &v);
+        text[by_hand] = povray_text(&s, &c, 5, &v);
         scene_free(&s);
     }
     assert_string_equal(text[0], text[1]);
@@ -418,7 +403,7 @@ TEST(test_shift)
     struct povray_variant v = povray_variant_plain();
     v.shift_x = .5;
     v.shift_y = .25;
-    char *text = text_of(&s, &c, 1, &v);
+    char *text = povray_text(&s, &c, 1, &v);
     double d[3], right[3], up[3];
     numbers_after(text, "\n  direction", d);
     numbers_after(text, "\n  right", right);
@@ -444,9 +429,9 @@ TEST(test_radiosity_on_demand)
         int depth;
         bool indirect, radiosity, roulette;
     } cases[] = {{1, true, false, false}, {5, true, true, true}, {5, false, false, true}};
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    for (size_t i = 0; i < COUNT(cases); i++) {
         v.indirect = cases[i].indirect;
-        char *text = text_of(&s, &c, cases[i].depth, &v);
+        char *text = povray_text(&s, &c, cases[i].depth, &v);
         assert_int_equal(strstr(text, "recursion_limit 4") != NULL, cases[i].radiosity);
         assert_int_equal(strstr(text, "radiosity {") != NULL, cases[i].radiosity);
         assert_int_equal(strstr(text, "Fate") != NULL, cases[i].roulette);

@@ -6,6 +6,7 @@
 #include "reference/povray/povray_glass.h"
 #include "reference/povray/povray_lamp.h"
 #include "renderer/scene/environment.h"
+#include "povray_fixture.h"
 #include "tests/support/test.h"
 
 static uint32_t build_glass(struct scene *s, enum material_kind kind)
@@ -32,16 +33,9 @@ static struct scene ball_of(enum material_kind kind)
 /* The text of a pass; the caller frees. */
 static char *text_of(const struct scene *s, const struct camera *c, int depth, int pass)
 {
-    struct err e;
-    char *text = NULL;
-    size_t size;
-    FILE *f = open_memstream(&text, &size);
-    assert_non_null(f);
     struct povray_variant v = povray_variant_plain();
     v.pass = pass;
-    MUST(export_povray(s, c, depth, &v, f, &e));
-    assert_int_equal(fclose(f), 0);
-    return text;
+    return povray_text(s, c, depth, &v);
 }
 
 static int count(const char *text, const char *what)
@@ -152,8 +146,7 @@ static void add_sky(struct scene *s, struct environment *env)
 static struct environment *image(int width, int height)
 {
     struct err e;
-    struct image im;
-    assert_true(image_alloc(&im, width, height, 3, (const char *[]){"R", "G", "B"}, &e));
+    struct image im = build_image(width, height);
     for (int i = 0; i < 3 * width * height; i++)
         im.data[i] = (float)i;
     struct environment *env = environment_from_image(&im, "test", &e);
@@ -206,7 +199,7 @@ TEST(test_glass_refused)
     static const char *const why[] = {"not have microfacets", "Schlick",       "is not 1",
                                       "must be above 1",      "that emits",    "front is inside",
                                       "the camera",           "may be inside", "at depth 7"};
-    for (size_t i = 0; i < sizeof why / sizeof *why; i++) {
+    for (size_t i = 0; i < COUNT(why); i++) {
         struct scene s = ball_of(i == 0 ? MATERIAL_MICROFACET : MATERIAL_GLASS);
         struct material *m = &s.materials[2];
         if (i == 0)
@@ -242,10 +235,7 @@ TEST(test_glass_meshes)
         int faces = what == 1 ? 3 : 4, swap = what == 2;
         for (int i = 0; i < faces; i++)
             build_triangle(&s, p[face[i][0]], p[face[i][1 + swap]], p[face[i][2 - swap]], m);
-        s.num_objects -= (uint32_t)faces - 1;
-        s.objects[s.num_objects - 1].num_triangles = (uint32_t)faces;
-        for (uint32_t i = s.num_triangles - (uint32_t)faces; i < s.num_triangles; i++)
-            s.tri_object[i] = s.num_objects - 1;
+        build_join(&s, s.num_objects - (uint32_t)faces);
         if (what == 1 || what == 2) {
             refused(&s, 10, "not a closed surface");
             continue;
@@ -298,9 +288,7 @@ TEST(test_lamp_points)
     uint32_t m = build_material(&s, grey(0), grey(1));
     build_triangle(&s, v3(0, 0, 0), v3(1, 0, 0), v3(0, 0, -1), m);
     build_triangle(&s, v3(0, 0, 0), v3(0, 0, 3), v3(1, 0, 0), m);
-    s.num_objects--;
-    s.objects[s.num_objects - 1].num_triangles = 2;
-    s.tri_object[1] = s.tri_object[0];
+    build_join(&s, 1);
     build_camera(&s, v3(0, 1, 9), 60);
     build_finish(&s, 40, 30);
     for (uint32_t i = 0; i < s.num_lights; i++) {

@@ -144,52 +144,32 @@ static struct scene corner(void)
     return s;
 }
 
-/* Puts a shell script called povray into a directory and that in front of PATH. */
-struct fake {
-    char dir[64], *path;
-};
-
-static void fake_begin(struct fake *k, const char *script)
-{
-    char file[128], path[8192];
-    strcpy(k->dir, "/tmp/fake_povray.XXXXXX");
-    assert_non_null(mkdtemp(k->dir));
-    k->path = strdup(getenv("PATH"));
-    assert_non_null(k->path);
-    if (script != NULL) {
-        snprintf(file, sizeof file, "%s/povray", k->dir);
-        FILE *f = fopen(file, "w");
-        assert_non_null(f);
-        fprintf(f, "#!/bin/sh\nif [ \"$1\" = --version ]; then echo POV-Ray 9; exit; fi\n%s\n",
-                script);
-        assert_int_equal(fclose(f), 0);
-        assert_int_equal(chmod(file, 0755), 0);
-    }
-    snprintf(path, sizeof path, "%s:%s", k->dir, script != NULL ? k->path : "/nonexistent");
-    setenv("PATH", path, 1);
-}
-
-static void fake_end(struct fake *k)
-{
-    struct err e;
-    setenv("PATH", k->path, 1);
-    free(k->path);
-    assert_true(fs_remove_tree(k->dir, &e));
-}
-
-/* The one-line error of a render with that engine. */
+/* The one-line error of a render with a shell script that is called povray; NULL: with none in PATH. */
 static void engine_fails(const char *script, double timeout_s, const char *const *says)
 {
-    struct fake k;
     struct fixture f;
     struct moments m;
     struct err e = {"nothing"};
     json_t *manifest = json_object();
     fixture_init(&f, corner(), 4, 2);
     f.opt.timeout_s = timeout_s;
-    fake_begin(&k, script);
-    assert_false(engine_driver_render(&povray_driver, &f.job, &m, manifest, &e));
-    fake_end(&k);
+    const char *file = test_path("bin/povray");
+    char *path = strdup(getenv("PATH")), text[1024], dirs[8192];
+    MUST(fs_make_dirs(test_path("bin"), &e));
+    if (script != NULL) {
+        snprintf(text, sizeof text,
+                 "#!/bin/sh\nif [ \"$1\" = --version ]; then echo POV-Ray 9; exit; fi\n%s\n",
+                 script);
+        test_write_text(file, text);
+        assert_int_equal(chmod(file, 0755), 0);
+    }
+    snprintf(dirs, sizeof dirs, "%s:%s", test_path("bin"), script != NULL ? path : "/nonexistent");
+    setenv("PATH", dirs, 1);
+    bool ok = engine_driver_render(&povray_driver, &f.job, &m, manifest, &e);
+    setenv("PATH", path, 1);
+    free(path);
+    (void)unlink(file);
+    assert_false(ok);
     for (; *says != NULL; says++)
         if (strstr(e.msg, *says) == NULL)
             fail_msg("'%s' does not say '%s'", e.msg, *says);
@@ -213,52 +193,38 @@ TEST(test_engine_failures)
  * each start, with the image's directory. */
 TEST(test_slow_start_is_tried_again)
 {
-    char count[64] = "/tmp/fake_count.XXXXXX", script[256];
-    int fd = mkstemp(count);
-    assert_true(fd >= 0);
-    close(fd);
+    const char *count = test_path("count");
+    char script[256];
     snprintf(script, sizeof script,
              "pwd >>%s; echo Timed out waiting for worker thread startup; exit 1", count);
     engine_fails(script, 60, (const char *[]){"exit status 1", "worker thread startup", NULL});
-    FILE *f = fopen(count, "r");
-    assert_non_null(f);
-    char line[256], first[256];
+    char *lines = test_read(count);
+    const size_t first = strcspn(lines, "\n") + 1;
     int starts = 0;
-    while (fgets(line, sizeof line, f) != NULL) {
-        if (starts == 0)
-            strcpy(first, line);
-        starts += strcmp(line, first) == 0;
-    }
-    fclose(f);
-    unlink(count);
+    for (const char *at = lines; *at != '\0'; at += strcspn(at, "\n") + 1)
+        starts += strncmp(at, lines, first) == 0;
+    free(lines);
     assert_int_equal(starts, 10);
 }
 
-/* A grey image of w x h for the fakes to hand out. */
-static void grey_exr(char path[64], int w, int h)
+/* A grey image of side x side for the fakes to hand out. */
+static const char *grey_exr(const char *name, int side)
 {
     struct err e;
-    struct image im;
-    strcpy(path, "/tmp/fake_image.XXXXXX");
-    int fd = mkstemp(path);
-    assert_true(fd >= 0);
-    close(fd);
-    assert_true(unlink(path) == 0);
-    strcat(path, ".exr");
-    assert_true(image_alloc(&im, w, h, 3, (const char *[]){"R", "G", "B"}, &e));
-    for (int i = 0; i < 3 * w * h; i++)
+    struct image im = build_image(side, side);
+    for (int i = 0; i < 3 * side * side; i++)
         im.data[i] = .5f;
-    assert_true(image_write_exr(path, &im, &e));
+    MUST(image_write_exr(test_path(name), &im, &e));
     image_free(&im);
+    return test_path(name);
 }
 
 /* Images that look fine but must not be believed. 4 x 4 pixels: windows are 8 x 8, the images of
  * replicates at subgrid 1 are 4 x 4. */
 TEST(test_implausible_images)
 {
-    char small[64], large[64], script[512];
-    grey_exr(small, 4, 4);
-    grey_exr(large, 8, 8);
+    const char *small = grey_exr("small.exr", 4), *large = grey_exr("large.exr", 8);
+    char script[512];
     const char *give = "case \"$*\" in *+W8*) cp %s scene.exr;; *) cp %s scene.exr;; esac; %s";
     snprintf(script, sizeof script, give, small, small, "");
     engine_fails(script, 60, (const char *[]){"4 x 4 x 3 values, not 8 x 8", NULL});
@@ -268,8 +234,6 @@ TEST(test_implausible_images)
     engine_fails(script, 60, (const char *[]){"kept 17 radiosity samples", NULL});
     snprintf(script, sizeof script, give, large, small, "echo '  retained for re-use:   0'");
     engine_fails(script, 60, (const char *[]){"replicates 0 and 1 are the same", NULL});
-    unlink(small);
-    unlink(large);
 }
 
 /* Largest relative difference of an image from a closed form, and that of the mean. The image
@@ -374,8 +338,7 @@ TEST(test_furnace)
         build_sphere(&s, v3(0, 0, 0), 2, -1, build_material(&s, albedo, emission));
         build_camera(&s, v3(.1f, .2f, 1), 60);
         fixture_init(&f, s, 8, depth);
-        json_t *manifest = json_object();
-        struct moments m = must_render(&f, manifest);
+        struct moments m = must_render(&f, NULL);
         assert_string_equal(m.unit, "exact");
         for (int i = 0; i < 3 * 8 * 8; i++) {
             double is = m.mean[i];
@@ -383,7 +346,6 @@ TEST(test_furnace)
             assert_false(fabs(is / truth_furnace(e[i % 3], a[i % 3], depth + 1) - 1) < 2.5e-4);
         }
         moments_free(&m);
-        json_decref(manifest);
         fixture_free(&f);
     }
 }
@@ -432,9 +394,7 @@ TEST(test_reproducible)
         fixture_init(&f, corner(), 8, 3);
         f.opt.threads = i == 0 ? 3 : THREADS;
         f.opt.seed = i == 2 ? 8 : 7;
-        json_t *manifest = json_object();
-        m[i] = must_render(&f, manifest);
-        json_decref(manifest);
+        m[i] = must_render(&f, NULL);
         fixture_free(&f);
     }
     assert_memory_equal(m[0].mean, m[1].mean, bytes);

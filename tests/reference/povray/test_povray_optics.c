@@ -17,10 +17,8 @@ static struct moments exact_image(struct scene s, int depth)
 {
     struct fixture f;
     fixture_init(&f, s, SIZE, depth);
-    json_t *manifest = json_object();
-    struct moments m = must_render(&f, manifest);
+    struct moments m = must_render(&f, NULL);
     assert_string_equal(m.unit, "exact");
-    json_decref(manifest);
     fixture_free(&f);
     return m;
 }
@@ -90,7 +88,8 @@ TEST(test_spot_light)
         build_quad(&s, v3(-2, 0, -2), v3(0, 0, 4), v3(4, 0, 0),
                    build_material(&s, (rgb){.8f, .5f, .3f}, grey(0)));
         look_down(&s, .5f);
-        build_spot(&s, v3(.2f, .7f, .1f), normalize(v3(-.3f, -1, .1f)), (float)spot.cos_cutoff, 3, (rgb){2, 1, 3});
+        build_spot(&s, v3(.2f, .7f, .1f), normalize(v3(-.3f, -1, .1f)), (float)spot.cos_cutoff, 3,
+                   (rgb){2, 1, 3});
         struct moments m = exact_image(s, 5);
         int used;
         assert_true(worst_pixel(&m, under_spot, &spot, .4, &used) < 5e-4);
@@ -253,8 +252,7 @@ static void sky_seen(double u, double v, const void *with, double out[3])
 static struct environment *sky(void)
 {
     struct err e;
-    struct image im;
-    assert_true(image_alloc(&im, SKY_WIDTH, SKY_HEIGHT, 3, (const char *[]){"R", "G", "B"}, &e));
+    struct image im = build_image(SKY_WIDTH, SKY_HEIGHT);
     for (int i = 0; i < 3 * SKY_WIDTH * SKY_HEIGHT; i++)
         im.data[i] = (float)sky_texel(i / 3 % SKY_WIDTH, i / 3 / SKY_WIDTH, i % 3);
     struct environment *env = environment_from_image(&im, "test", &e);
@@ -280,14 +278,12 @@ TEST(test_sky)
         }
         fixture_init(&f, s, SIZE, 0);
         assert_true(scene_add_environment(&f.s, sky(), &e));
-        json_t *manifest = json_object();
-        struct moments m = must_render(&f, manifest);
+        struct moments m = must_render(&f, NULL);
         struct view right = {quarter, 0}, wrong = {quarter, M_PI / 360};
         int used;
         assert_true(worst_pixel(&m, sky_seen, &right, 1, &used) < 4e-4);
         assert_false(worst_pixel(&m, sky_seen, &wrong, 1, &used) < 4e-4);
         moments_free(&m);
-        json_decref(manifest);
         fixture_free(&f);
     }
 }

@@ -17,13 +17,6 @@ static bool same_light(const double a[3], const double b[3])
     return same(a[0], b[0]) && same(a[1], b[1]) && same(a[2], b[2]);
 }
 
-/* A fixed sequence of numbers in [0,1). */
-static double next_number(uint64_t *state)
-{
-    *state = *state * 6364136223846793005u + 1442695040888963407u;
-    return (double)(*state >> 11) / 9007199254740992.0;
-}
-
 /* Radiance in the direction (sx, sy, -1) by any of the routes. */
 typedef void radiance_at(const void *scene, double sx, double sy, double light[3]);
 

@@ -13,61 +13,12 @@
 
 #include <gsl/gsl_integration.h>
 
-static double next_number(uint64_t *state)
-{
-    *state = *state * 6364136223846793005u + 1442695040888963407u;
-    return (double)(*state >> 11) / 9007199254740992.0;
-}
-
 static void unit_vector(uint64_t *state, double n[3])
 {
     double z = 2 * next_number(state) - 1, phi = 2 * M_PI * next_number(state);
     n[0] = sqrt(1 - z * z) * cos(phi);
     n[1] = z;
     n[2] = sqrt(1 - z * z) * sin(phi);
-}
-
-/* Nested adaptive quadrature over [a0,a1] x [b0,b1], relative error 1e-11. */
-struct double_integral {
-    double (*f)(double a, double b, const void *data);
-    const void *data;
-    double a, b0, b1;
-    gsl_integration_workspace *inner;
-};
-
-enum { INTERVALS = 500 };
-
-static double over_b(double b, void *p)
-{
-    const struct double_integral *in = p;
-    return in->f(in->a, b, in->data);
-}
-
-static double over_a(double a, void *p)
-{
-    struct double_integral *in = p;
-    double value, error;
-    in->a = a;
-    gsl_function g = {over_b, in};
-    assert_int_equal(gsl_integration_qag(&g, in->b0, in->b1, 1e-13, 1e-12, INTERVALS,
-                                         GSL_INTEG_GAUSS31, in->inner, &value, &error),
-                     0);
-    return value;
-}
-
-static double integrate(double (*f)(double, double, const void *), const void *data, double a0,
-                        double a1, double b0, double b1)
-{
-    gsl_integration_workspace *outer = gsl_integration_workspace_alloc(INTERVALS);
-    struct double_integral in = {f, data, 0, b0, b1, gsl_integration_workspace_alloc(INTERVALS)};
-    gsl_function g = {over_a, &in};
-    double value, error;
-    assert_int_equal(gsl_integration_qag(&g, a0, a1, 1e-12, 1e-11, INTERVALS, GSL_INTEG_GAUSS31,
-                                         outer, &value, &error),
-                     0);
-    gsl_integration_workspace_free(in.inner);
-    gsl_integration_workspace_free(outer);
-    return value;
 }
 
 /* A rough metal seen under cos_o: the mean of F G2/G1 over the normals m visible from wo, whose density
@@ -120,7 +71,7 @@ static double visible_normal(double psi, double t, const void *data)
 
 static double albedo_by_normals(const struct metal *m)
 {
-    return 2 * integrate(visible_normal, m, 0, M_PI, 0, 1);
+    return 2 * integrate_plane(visible_normal, m, (double[]){0, M_PI}, (double[]){0, 1});
 }
 
 static const double metal_alpha = 0.5, metal_eta[3] = {.2, .9, 1.3}, metal_k[3] = {3.9, 2.5, 2.3};
@@ -186,10 +137,11 @@ TEST(wall_share_both_ways)
         struct wall_point p = {0.15 + 2 * next_number(&s), 0.5 + 2 * next_number(&s), 0};
         double z[2] = {-1.5 + 2 * next_number(&s), 0};
         z[1] = z[0] + 0.2 + 2 * next_number(&s);
+        const double y[2] = {0, p.height};
         double share = truth_wall_share(p.distance, z, p.height);
-        assert_true(same(share, integrate(wall_element, &p, 0, p.height, z[0], z[1])));
+        assert_true(same(share, integrate_plane(wall_element, &p, y, z)));
         for (p.mistake = 1; p.mistake <= 2; p.mistake++)
-            assert_false(same(share, integrate(wall_element, &p, 0, p.height, z[0], z[1])));
+            assert_false(same(share, integrate_plane(wall_element, &p, y, z)));
     }
     /* A wall without end hides half of the sky from a point at its foot. */
     const double wide[2] = {-1e9, 1e9};
@@ -235,9 +187,11 @@ TEST(gradient_both_ways)
         unit_vector(&s, p.n);
         make_frame(&p);
         double form = truth_gradient_reflected(&sky, p.channel, p.n);
-        assert_true(same(form, integrate(sky_element, &p, 0, M_PI_2, 0, 2 * M_PI)));
+        assert_true(same(form, integrate_plane(sky_element, &p, (double[]){0, M_PI_2},
+                                               (double[]){0, 2 * M_PI})));
         p.no_cosine = true;
-        assert_false(same(form, integrate(sky_element, &p, 0, M_PI_2, 0, 2 * M_PI)));
+        assert_false(same(form, integrate_plane(sky_element, &p, (double[]){0, M_PI_2},
+                                                (double[]){0, 2 * M_PI})));
         const double turned[3] = {p.n[2], p.n[1], -p.n[0]};
         assert_false(same(form, truth_gradient_reflected(&sky, p.channel, turned)));
     }

@@ -250,15 +250,10 @@ TEST(a_cube_of_any_size)
     static const float half[] = {1e-5f, 5e-4f, 1, 5e3f, 2e4f, 1e6f};
     struct err e = {0};
     for (size_t k = 0; k < sizeof half / sizeof *half; k++) {
-        const float a = half[k], b = 2 * a;
+        const float a = half[k];
         struct scene s = build_scene();
         uint32_t m = build_material(&s, grey(0.5f), grey(0));
-        build_quad(&s, v3(-a, -a, -a), v3(0, b, 0), v3(b, 0, 0), m);
-        build_quad(&s, v3(-a, -a, a), v3(b, 0, 0), v3(0, b, 0), m);
-        build_quad(&s, v3(-a, -a, -a), v3(b, 0, 0), v3(0, 0, b), m);
-        build_quad(&s, v3(-a, a, -a), v3(0, 0, b), v3(b, 0, 0), m);
-        build_quad(&s, v3(-a, -a, -a), v3(0, 0, b), v3(0, b, 0), m);
-        build_quad(&s, v3(a, -a, -a), v3(0, b, 0), v3(0, 0, b), m);
+        build_box(&s, v3(-a, -a, -a), v3(2 * a, 2 * a, 2 * a), m);
         MUST(scene_finish(&s, "test", &e));
         struct bvh *bvh = bvh_build(&s, BVH_WIDE, &e);
         assert_non_null(bvh);
@@ -299,12 +294,7 @@ TEST(corners_edges_and_faces)
     struct err e = {0};
     struct scene s = build_scene();
     uint32_t m = build_material(&s, grey(0.5f), grey(0));
-    build_quad(&s, v3(0, 0, 0), v3(0, 1, 0), v3(1, 0, 0), m);
-    build_quad(&s, v3(0, 0, 1), v3(1, 0, 0), v3(0, 1, 0), m);
-    build_quad(&s, v3(0, 0, 0), v3(1, 0, 0), v3(0, 0, 1), m);
-    build_quad(&s, v3(0, 1, 0), v3(0, 0, 1), v3(1, 0, 0), m);
-    build_quad(&s, v3(0, 0, 0), v3(0, 0, 1), v3(0, 1, 0), m);
-    build_quad(&s, v3(1, 0, 0), v3(0, 1, 0), v3(0, 0, 1), m);
+    build_box(&s, v3(0, 0, 0), v3(1, 1, 1), m);
     build_triangle(&s, v3(3, 0, 0), v3(-7, 0, 0), v3(3, 1, 0), m);
     build_sphere(&s, v3(9, 1, 2), 0.5f, 1, m);
     build_sphere(&s, v3(4, 1, 2), 0.25f, -1, m);

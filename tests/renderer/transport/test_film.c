@@ -15,10 +15,9 @@ struct fixture {
 static void finish(struct fixture *f, int width, int height)
 {
     struct err e = {0};
-    if (!scene_finish(&f->scene, "test", &e) ||
-        !camera_init(&f->camera, &f->scene, width, height, &e) ||
-        (f->bvh = bvh_build(&f->scene, BVH_SAH, &e)) == NULL)
-        fail_msg("%s", e.msg);
+    f->camera = build_finish(&f->scene, width, height);
+    f->bvh = bvh_build(&f->scene, BVH_SAH, &e);
+    MUST(f->bvh != NULL);
 }
 
 static void drop(struct fixture *f)
@@ -139,9 +138,8 @@ TEST(resumed_equals_uninterrupted)
             struct film read;
             o.threads = 3 - o.threads;
             assert_true(film_alloc(&read, SIZE, SIZE, mode == 1, &e));
-            if (!checkpoint_write(path, &some_id, &film, &e) ||
-                !checkpoint_read(path, &some_id, &read, &e))
-                fail_msg("%s", e.msg);
+            MUST(checkpoint_write(path, &some_id, &film, &e) &&
+                 checkpoint_read(path, &some_id, &read, &e));
             film_free(&film);
             film = read;
             stops++;
@@ -520,9 +518,8 @@ TEST(albedo_layer_of_materials)
                {0.4, 0.4, 0.6}}};
     for (size_t i = 0; i < COUNT(of); i++) {
         struct fixture f = {.scene = build_scene()};
-        uint32_t m = build_material(&f.scene, grey(0), grey(0));
-        f.scene.materials[m] = of[i].m;
-        build_quad(&f.scene, v3(-30, -30, -3), v3(60, 0, 0), v3(0, 60, 0), m);
+        build_quad(&f.scene, v3(-30, -30, -3), v3(60, 0, 0), v3(0, 60, 0),
+                   build_like(&f.scene, of[i].m));
         build_camera(&f.scene, v3(0, 0, 0), 60);
         finish(&f, SIZE, SIZE);
         struct render_options o = options_of(2);
@@ -599,9 +596,8 @@ TEST(heatmap_of_one_triangle)
     struct err e = {0};
     struct image im;
     uint64_t most;
-    if (!heatmap_write(path, f.bvh, &f.camera, 1, 0, 7, 4, &most, &e) ||
-        !image_read(path, &im, NULL, &e))
-        fail_msg("%s", e.msg);
+    MUST(heatmap_write(path, f.bvh, &f.camera, 1, 0, 7, 4, &most, &e) &&
+         image_read(path, &im, NULL, &e));
     uint8_t top[3];
     heatmap_colour(1, top);
     assert_true(most == 1 && im.width == 7 && im.height == 4);

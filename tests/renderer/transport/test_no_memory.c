@@ -170,7 +170,8 @@ static bool sky(const void *arg, double *digest, struct err *e)
         arg != NULL ? environment_read(arg, e) : environment_upper_half((rgb){1, 2, 3}, e);
     if (env == NULL)
         return false;
-    *digest = environment_total(env) + (double)environment_pdf_w(env, v3(0, 1, 0), v3(0.6f, 0, 0.8f));
+    *digest =
+        environment_total(env) + (double)environment_pdf_w(env, v3(0, 1, 0), v3(0.6f, 0, 0.8f));
     environment_free(env);
     return true;
 }
@@ -282,13 +283,7 @@ static bool draw(const void *arg, double *digest, struct err *e)
 TEST(renders)
 {
     struct err e = {0};
-    struct scene s = build_scene();
-    uint32_t white = build_material(&s, grey(0.6f), grey(0)),
-             lamp = build_material(&s, grey(0), grey(9));
-    build_quad(&s, v3(-1, 0, 1), v3(2, 0, 0), v3(0, 0, -2), white);
-    build_quad(&s, v3(-0.3f, 1.49f, -0.4f), v3(0.6f, 0, 0), v3(0, 0, 0.8f), lamp);
-    build_sphere(&s, v3(0.4f, 0.3f, 0.3f), 0.3f, 1, white);
-    build_camera(&s, v3(0, 0.75f, 3), 49);
+    struct scene s = build_room(9);
     struct camera c = build_finish(&s, 20, 18);
     struct bvh *bvh = bvh_build(&s, BVH_WIDE, &e);
     MUST(bvh != NULL);
