@@ -291,12 +291,12 @@ static bool render_singles(const struct rate_image *r, struct pool *p, const cha
     if (p->consistent_view < 0)
         return true;
     const struct view *v = &r->c.view[p->consistent_view];
-    char dir[4400], image[4500], log[4500];
+    char dir[4400];
     const struct suite_scene *found;
     const struct suite_variant *variant;
     work_dir(r, 0, dir);
-    snprintf(image, sizeof image, "%s/single.exr", dir);
-    snprintf(log, sizeof log, "%s/single.log", dir);
+    const struct path image = fs_path("%s/single.exr", dir);
+    const struct path log = fs_path("%s/single.log", dir);
     if (!catalogue_view_scene(v, &r->suite, &found, &variant, e))
         return false;
     struct suite_scene scene = *found;
@@ -309,8 +309,8 @@ static bool render_singles(const struct rate_image *r, struct pool *p, const cha
                                            .seed = 900000 + (uint64_t)k,
                                            .threads = 1,
                                            .timeout_s = 600,
-                                           .image = image,
-                                           .log = log};
+                                           .image = image.s,
+                                           .log = log.s};
         double cpu_s;
         if (!run_pathtracer(&job, &p->single[k], &cpu_s, NULL, e))
             return false;
@@ -349,7 +349,6 @@ static bool rate_synthetic(const struct rate_image *r, struct pool *p, struct er
 
 static bool rate_correct(const struct rate_image *r, struct err *e)
 {
-    char program[4400];
     struct claim_run *task = calloc(POOL, sizeof *task);
     struct pool p = {.task = task};
     struct diagnose_options opt = {.alpha = alpha};
@@ -357,9 +356,9 @@ static bool rate_correct(const struct rate_image *r, struct err *e)
     double lead = -INFINITY, log10_p = 0;
     if (task == NULL)
         return err_set(e, "out of memory");
-    snprintf(program, sizeof program, "%s/pathtracer", r->build);
+    const struct path program = fs_path("%s/pathtracer", r->build);
     for (int k = 0; k < POOL; k++)
-        task[k].look = (struct look){.program = program,
+        task[k].look = (struct look){.program = program.s,
                                      .scale_percent = 100,
                                      .spp_percent = 50,
                                      .seed = 5000 + (uint64_t)k};
@@ -383,7 +382,8 @@ static bool rate_correct(const struct rate_image *r, struct err *e)
             "| real, 50 %% of the samples | %d | %d | %.2f | %.1f (bound %.1f) |\n",
             alpha, POOL, accused, log10_p, lead / log(10), diagnose_bound(&r->c, alpha) / log(10));
     fflush(stdout);
-    ok = ok && fill_pool(r, &p, e) && render_singles(r, &p, program, e) && rate_synthetic(r, &p, e);
+    ok = ok && fill_pool(r, &p, e) && render_singles(r, &p, program.s, e) &&
+         rate_synthetic(r, &p, e);
     for (int k = 0; p.single != NULL && k < POOL; k++)
         moments_free(&p.single[k]);
     free(p.single);

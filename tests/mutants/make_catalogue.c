@@ -170,14 +170,13 @@ static bool make_effect(const struct maker *m, const struct base *base, struct v
                         struct err *e)
 {
     struct signature bug[BATCHES];
-    char program[4400];
-    snprintf(program, sizeof program, "%s/mutants/%s/pathtracer", m->build, m->made.bug[b].name);
-    if (!render(base, program, 0, &bug[0], e))
+    const struct path program = fs_path("%s/mutants/%s/pathtracer", m->build, m->made.bug[b].name);
+    if (!render(base, program.s, 0, &bug[0], e))
         return err_prefix(e, "%s", m->made.bug[b].name);
     if (same_values(&bug[0], &base->batch[0]))
         return true;
     for (int k = 1; k < BATCHES; k++)
-        if (!render(base, program, k, &bug[k], e))
+        if (!render(base, program.s, k, &bug[k], e))
             return err_prefix(e, "%s", m->made.bug[b].name);
     v->effect[b] = calloc(1, sizeof *v->effect[b]);
     if (v->effect[b] == NULL)
@@ -221,10 +220,9 @@ static bool make_missing(void *arg, int b, struct err *e)
 {
     const struct effects *x = arg;
     struct base base = *x->base;
-    char dir[300];
-    snprintf(dir, sizeof dir, "%s/%d", x->m->work, b);
-    base.job.work_dir = dir;
-    return !x->missing[b] || (fs_make_dirs(dir, e) && make_effect(x->m, &base, x->view, b, e));
+    const struct path dir = fs_path("%s/%d", x->m->work, b);
+    base.job.work_dir = dir.s;
+    return !x->missing[b] || (fs_make_dirs(dir.s, e) && make_effect(x->m, &base, x->view, b, e));
 }
 
 static bool make_view(struct maker *m, int i, struct err *e)
@@ -251,11 +249,10 @@ static bool make_view(struct maker *m, int i, struct err *e)
     }
     for (int b = 0; ok && b < m->made.num_bugs; b++)
         any = any || missing[b];
-    char program[4400];
-    snprintf(program, sizeof program, "%s/pathtracer", m->build);
+    const struct path program = fs_path("%s/pathtracer", m->build);
     if (ok && any)
-        ok = make_batches(base, program, e) &&
-             (v->correct.columns > 0 || make_correct(base, program, v, e));
+        ok = make_batches(base, program.s, e) &&
+             (v->correct.columns > 0 || make_correct(base, program.s, v, e));
     struct effects effects = {m, base, v, missing};
     ok = ok && work_run_all(NULL, m->made.num_bugs, make_missing, &effects, e);
     int seen = 0;

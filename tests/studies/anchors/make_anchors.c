@@ -4,6 +4,7 @@
  * anchors`. */
 #include "anchors.h"
 
+#include "renderer/base/fs.h"
 #include "tests/studies/calibration/work.h"
 #include "tests/support/rates.h"
 #include "renderer/base/version.h"
@@ -438,7 +439,6 @@ int main(int argc, char **argv)
 {
     struct anchor_results *r = calloc(1, sizeof *r);
     struct err e = {""};
-    char path[4096];
     bool page = argc == 3 && strcmp(argv[1], "--page") == 0;
     bool quick = argc == 3 && strcmp(argv[1], "--quick") == 0;
     if (r == NULL || (!page && !quick && (argc != 2 || argv[1][0] == '-'))) {
@@ -446,7 +446,7 @@ int main(int argc, char **argv)
         return 3;
     }
     const char *dir = argv[argc - 1];
-    snprintf(path, sizeof path, "%s/results.json", dir);
+    const struct path path = fs_path("%s/results.json", dir);
     if (!page) {
         struct anchor_settings set = anchor_settings;
         if (quick) {
@@ -454,9 +454,9 @@ int main(int argc, char **argv)
             set.num_pairs = 20;
             set.reference_spp = 640;
         }
-        measure(&set, quick ? 2 : NUM_ANCHOR_SCENES, path, r);
+        measure(&set, quick ? 2 : NUM_ANCHOR_SCENES, path.s, r);
     }
-    if (!anchors_load(path, r, &e) || !anchors_write_page(dir, r, &e))
+    if (!anchors_load(path.s, r, &e) || !anchors_write_page(dir, r, &e))
         die(dir, &e);
     free(r);
     return 0;

@@ -69,7 +69,6 @@ static void take_replicate(void *ctx, int k, const float *pixels_rgb)
 static bool render_cycles(const struct bench_view *v, int spp, int count, uint32_t seed,
                           const char *work_dir, float *images, struct err *e)
 {
-    char dir[4096];
     struct suite_scene suite = {
         .width = v->camera.width, .height = v->camera.height, .depth = v->depth};
     struct suite_reference ref = {.replicates = count, .spp = spp};
@@ -82,17 +81,17 @@ static bool render_cycles(const struct bench_view *v, int spp, int count, uint32
                                           .on_replicate = take_replicate,
                                           .on_replicate_ctx = &sink};
     snprintf(suite.name, sizeof suite.name, "%s", v->name);
-    snprintf(dir, sizeof dir, "%s/engine", work_dir);
-    const struct reference_job job = {&suite, &ref, &opt, &v->scene, &v->camera, dir};
+    const struct path dir = fs_path("%s/engine", work_dir);
+    const struct reference_job job = {&suite, &ref, &opt, &v->scene, &v->camera, dir.s};
     struct moments m;
     json_t *manifest = json_object();
-    bool ok = fs_remove_tree(dir, e) && fs_make_dirs(dir, e) &&
+    bool ok = fs_remove_tree(dir.s, e) && fs_make_dirs(dir.s, e) &&
               engine_driver_render(&cycles_driver, &job, &m, manifest, e);
     json_decref(manifest);
     if (!ok)
         return false;
     moments_free(&m);
-    return fs_remove_tree(dir, e);
+    return fs_remove_tree(dir.s, e);
 }
 
 bool bench_engine_render(enum bench_engine engine, const struct bench_view *v, int spp, int count,

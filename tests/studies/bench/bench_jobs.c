@@ -27,20 +27,19 @@ enum { NUM_PATHS = 3, NUM_NORMALS = 4, NORMALS_THREADS = 2, MAX_ARGS = 32 };
 static bool run_program(const struct bench_options *o, const char *scene, bool is_course,
                         const char *const *options, double *median, struct err *e)
 {
-    char program[4096], image[4096], log[4096];
     double cpu[BENCH_MAX_ROUNDS];
-    snprintf(program, sizeof program, "%s/pathtracer", o->build);
-    snprintf(image, sizeof image, "%s/job.exr", o->out);
-    snprintf(log, sizeof log, "%s/job.log", o->out);
+    const struct path program = fs_path("%s/pathtracer", o->build);
+    const struct path image = fs_path("%s/job.exr", o->out);
+    const struct path log = fs_path("%s/job.log", o->out);
     const char *argv[MAX_ARGS] = {
-        program, "--accel", "wide", "--isa",     isa_names[o->isa],
-        "-f",    image,     "-q",   "--dialect", is_course ? "cgl" : "auto",
+        program.s, "--accel", "wide", "--isa",     isa_names[o->isa],
+        "-f",      image.s,   "-q",   "--dialect", is_course ? "cgl" : "auto",
         scene};
     int argc = 11;
     for (; *options != NULL; options++)
         argv[argc++] = *options;
     for (int k = 0; k < o->rounds; k++) {
-        const struct process p = {.argv = argv, .log = log};
+        const struct process p = {.argv = argv, .log = log.s};
         struct process_usage usage;
         if (!process_run(&p, &usage, e))
             return false;

@@ -120,18 +120,17 @@ static void plan(enum bench_engine engine, const struct bench_options *o,
 static bool run(enum bench_engine engine, const struct bench_options *o, const struct bench_view *v,
                 int round, struct runs *r, struct err *e)
 {
-    char work[4096];
     double cpu[NUM_RUNGS];
     struct bench_view view = *v;
     view.camera.width /= r->shrink;
     view.camera.height /= r->shrink;
     size_t size = 3 * (size_t)view.camera.width * (size_t)view.camera.height;
-    snprintf(work, sizeof work, "%s/work", o->out);
-    if (!fs_make_dirs(work, e))
+    const struct path work = fs_path("%s/work", o->out);
+    if (!fs_make_dirs(work.s, e))
         return false;
     for (int k = 0; k < NUM_RUNGS; k++) {
         uint32_t seed = (uint32_t)(1000 * engine + 10 * round + k);
-        if (!bench_engine_render(engine, &view, r->spp[k], COUNT, seed, work,
+        if (!bench_engine_render(engine, &view, r->spp[k], COUNT, seed, work.s,
                                  r->images[k] + (size_t)(round * COUNT) * size, &cpu[k], e))
             return false;
     }

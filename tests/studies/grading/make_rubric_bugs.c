@@ -214,13 +214,13 @@ static bool make_view(struct maker *m, int view, int b, const struct answer_opti
 static bool make_bug(void *ctx, int b, struct err *e)
 {
     struct maker *m = ctx;
-    char cache[PATH_MAX], program[PATH_MAX];
+    char cache[PATH_MAX];
     struct answer_options bug;
     const struct bug *what = &m->made.bug[b];
     int seen = 0;
     bool same[MOST_RUBRICS * RUBRIC_IMAGES * 2] = {false};
-    snprintf(program, sizeof program, "%.3900s/mutants/%s/pathtracer", m->build, what->name);
-    if (!open_cache(m, what->name, what->patch_sha256, program, cache, &bug, e))
+    const struct path program = fs_path("%.3900s/mutants/%s/pathtracer", m->build, what->name);
+    if (!open_cache(m, what->name, what->patch_sha256, program.s, cache, &bug, e))
         return false;
     for (int v = 0; v < m->made.num_views; v++) {
         if (!make_view(m, v, b, &bug, same, e))
@@ -304,19 +304,19 @@ static bool add_views(struct maker *m, const struct answer_options *ours, struct
 static bool make(struct maker *m, const char *patches, struct err *e)
 {
     static char cache[PATH_MAX];
-    char ours[PATH_MAX], out[2 * PATH_MAX];
+    char ours[PATH_MAX];
     const struct rubric *r = &m->course[0]->rubric;
     snprintf(ours, sizeof ours, "%.4000s/pathtracer", m->build);
     if (!bug_list(patches, &m->made, e) || !bug_list("tests/studies/grading/bugs", &m->made, e) ||
         !open_cache(m, "correct", "references", ours, cache, &m->correct, e) ||
         !add_views(m, &m->correct, e))
         return false;
-    snprintf(out, sizeof out, "%s/%s", r->dir, r->bugs);
+    const struct path out = fs_path("%s/%s", r->dir, r->bugs);
     struct err none;
-    if (!catalogue_read(out, &m->old, &none))
+    if (!catalogue_read(out.s, &m->old, &none))
         m->old = (struct catalogue){0};
     return work_run_all(NULL, m->made.num_bugs, make_bug, m, e) &&
-           catalogue_write(out, &m->made, e);
+           catalogue_write(out.s, &m->made, e);
 }
 
 /* That the directory of the catalogue is not there is a mistake: it is made before. */

@@ -30,9 +30,8 @@ static const char *write_text(const char *name, const char *text)
 /* The block number k of a page, of that language, up to its closing fence. */
 static void read_block(const char *page, const char *language, int k, char block[TEXT])
 {
-    char fence[32], path[128];
-    snprintf(path, sizeof path, "tools/docs/formats/%s", page);
-    OWN_TEXT text = test_read(path);
+    char fence[32];
+    OWN_TEXT text = test_read(fs_path("tools/docs/formats/%s", page).s);
     snprintf(fence, sizeof fence, "```%s\n", language);
     const char *at = text;
     for (; k >= 0; k--)
@@ -91,11 +90,10 @@ static size_t name_length(const char *text)
 /* First cells of the tables that have this heading over it: the name that each piece of code begins with. */
 static void page_words(const char *page, const char *heading, struct words *out)
 {
-    char path[128], head[64];
+    char head[64];
     bool in = false;
-    snprintf(path, sizeof path, "tools/docs/formats/%s", page);
     snprintf(head, sizeof head, "| %s |", heading);
-    OWN_TEXT text = test_read(path);
+    OWN_TEXT text = test_read(fs_path("tools/docs/formats/%s", page).s);
     *out = (struct words){.num = 0};
     for (char *line = text, *next; line != NULL; line = next) {
         next = strchr(line, '\n');

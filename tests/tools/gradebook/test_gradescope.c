@@ -7,6 +7,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 
+#include "renderer/base/fs.h"
 #include "tools/gradebook/grade_batch.h"
 
 #include <math.h>
@@ -175,12 +176,11 @@ static const char *output_of(const json_t *root, size_t i)
 
 static json_t *results_of(const char *id)
 {
-    char path[256];
     json_error_t why;
-    snprintf(path, sizeof path, "%s/%s/results.json", dir, id);
-    json_t *root = json_load_file(path, 0, &why);
+    const struct path path = fs_path("%s/%s/results.json", dir, id);
+    json_t *root = json_load_file(path.s, 0, &why);
     if (root == NULL)
-        fail_msg("%s: %s", path, why.text);
+        fail_msg("%s: %s", path.s, why.text);
     return root;
 }
 
