@@ -148,13 +148,13 @@ $(1)/$(2)_$(3).c.o: $(2).c | $(4)
 	$$(compile_c)
 endef
 
-# libassay.so (tools/library/assay.h): what two images need, compiled so that it may lie anywhere.
+# libassay.so (tools/library/assay.h): what two images need, compiled so that it may lie anywhere, and called as if it could not.
 LIBRARY_ABI     := 1
 LIBRARY_SOURCES := $(wildcard $(addsuffix /*.c,$(addprefix renderer/,base math image) reference/base reference/suite \
   $(addprefix tools/,images stats compare exact input sequential results html plots report library)) \
   $(addprefix tools/base/,temp_dir.c text.c) tools/validate/compare_job.c tools/validate/same_program.c)
-$(BUILD)/pic/%: CFLAGS += -fPIC
-$(BUILD)/libassay.so.$(LIBRARY_ABI): $(call obj,$(BUILD)/pic,$(LIBRARY_SOURCES)) tools/library/assay.map | $(BUILD)/oiio.so
+$(call obj,$(BUILD),$(LIBRARY_SOURCES)): CFLAGS += -fPIC -fno-semantic-interposition
+$(BUILD)/libassay.so.$(LIBRARY_ABI): $(call obj,$(BUILD),$(LIBRARY_SOURCES)) tools/library/assay.map | $(BUILD)/oiio.so
 	$(call say,LINK,$@)
 	$(Q)$(CXX) $(OPT) -shared -Wl,-soname,$(@F) -Wl,--version-script=tools/library/assay.map -Wl,-z,defs -Wl,--gc-sections \
 	  -o $@ $(filter %.o,$^) $(LIBS) -ldl && ln -sf $(@F) $(BUILD)/libassay.so
@@ -183,7 +183,6 @@ $(1)/renderer/base/version.c.o: $(BUILD)/commit
 $(1)/renderer/base/version.c.o: CFLAGS += -DASSAY_VERSION='"$(VERSION)"' -DASSAY_COMMIT='"$(COMMIT)"'
 endef
 $(eval $(call tree,$(BUILD),$(BUILD)/deps))
-$(eval $(call tree,$(BUILD)/pic,$(BUILD)/deps))
 
 $(BUILD)/commit: FORCE
 	$(Q)mkdir -p $(@D) && echo $(VERSION) $(COMMIT) | cmp -s - $@ || echo $(VERSION) $(COMMIT) > $@

@@ -13,7 +13,7 @@ tell "it installs" "$([ -e "$tmp/usr/lib/libassay.so.1" ] || tail -n 3 "$tmp/ins
 tell "its symbols are those of its header" "$(diff \
     <(nm -D --defined-only "$tmp/usr/lib/libassay.so.1" | sed -n 's/.* T \([^@]*\).*/\1/p' | sort) \
     <(grep -oE '\bassay_[a-z_]+\(' tools/library/assay.h | tr -d '(' | sort -u))"
-tell "it prints nothing and ends nobody" "$(for object in "$build"/pic/tools/library/*.o; do
+tell "it prints nothing and ends nobody" "$(for object in "$build"/tools/library/*.o; do
     nm "$object" | grep -wE 'U (printf|puts|putchar|exit|abort|stdout|stderr)'
 done)"
 
