@@ -520,7 +520,8 @@ TEST(test_shared_seeds)
     for (int i = 0; i < 1000; i++) {
         enum law law = i % 2 ? LAW_RARE : LAW_FIREFLY;
         simulate_pair(&a, &b, law, i % 2 ? 3 : 128, true, &seed);
-        OWN(comparison) judged = compare(&a, &b, opt);
+        struct comparison judged = compare(&a, &b, opt);
+        comparison_free(&judged);
     }
     constant(&a, 1, 1);
     constant(&b, 1, 1);
@@ -585,8 +586,9 @@ TEST(test_cost)
     simulate_pair(&a, &b, LAW_EXPONENTIAL, 8, true, &seed);
     struct rusage before, after;
     getrusage(RUSAGE_SELF, &before);
-    OWN(comparison) c = compare(&a, &b, (struct compare_options){.alpha = 1e-3, .tile = 16});
+    struct comparison c = compare(&a, &b, (struct compare_options){.alpha = 1e-3, .tile = 16});
     getrusage(RUSAGE_SELF, &after);
+    comparison_free(&c);
     double cpu = (double)(after.ru_utime.tv_sec - before.ru_utime.tv_sec) +
                  1e-6 * (double)(after.ru_utime.tv_usec - before.ru_utime.tv_usec);
     double more = (double)(after.ru_maxrss - before.ru_maxrss) / 1024;

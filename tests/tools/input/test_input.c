@@ -343,7 +343,8 @@ TEST(test_hygiene)
     odd_exr(test_path("ok.exr"), 1, 1, "ABGR", false, (float[4]){1, 1, 1, 1});
     assert_refused(test_path("ok.exr"), (struct input_options){.spp = 4}, "--spp-a");
     struct notes notes = {0};
-    OWN(input) in = read_side(test_path("ok.exr"), none, &notes);
+    struct input in = read_side(test_path("ok.exr"), none, &notes);
+    input_free(&in);
     odd_file(test_path("words.exr"), "no image");
     assert_refused(test_path("words.exr"), none, "cannot read");
     assert_refused(test_path("gone.exr"), none, "gone.exr: cannot read");
