@@ -103,6 +103,14 @@ static void climb(gsl_rng *rng, const struct engine *g, const struct converge_re
     free(images);
 }
 
+#define REFERENCE                                                                                  \
+    __attribute__((cleanup(convergence_rate_reference_free))) struct converge_reference
+static void rng_free(gsl_rng **rng)
+{
+    gsl_rng_free(*rng);
+}
+#define RNG __attribute__((cleanup(rng_free))) gsl_rng
+
 static gsl_rng *new_rng(unsigned long seed)
 {
     gsl_rng *rng = gsl_rng_alloc(gsl_rng_mt19937);
@@ -125,9 +133,9 @@ static void assert_rate(const char *what, int wrong, int n, double alpha)
 TEST(estimates_are_their_definitions)
 {
     enum { COUNT = 5 };
-    gsl_rng *rng = new_rng(1);
+    RNG *rng = new_rng(1);
     const struct engine g = {EXPONENTIAL, 0.1, 1, 1};
-    struct converge_reference ref = make_reference(rng, &g, 100, 0);
+    REFERENCE ref = make_reference(rng, &g, 100, 0);
     static float images[COUNT * SIZE], fewer[COUNT * SIZE];
     struct rung all, without;
     struct err e;
@@ -176,8 +184,6 @@ TEST(estimates_are_their_definitions)
     assert_near(all.log_variance.se, se[1], 1e-9);
     assert_near(all.bias2.se, se[2], 1e-12);
     assert_near(all.bias2.dof, COUNT - 1, 1e-9);
-    convergence_rate_reference_free(&ref);
-    gsl_rng_free(rng);
 }
 
 /* Weighted least squares by GSL, with the weights that the header names. */
@@ -279,23 +285,21 @@ TEST(slope_interval_covers)
     static const double rate[][2] = {{0.05, 1e-3}, {0.05, 1e-3}, {0.15, 0.01}};
     for (int law = EXPONENTIAL; law <= SHARED; law++) {
         enum { RUNS = 2000 };
-        gsl_rng *rng = new_rng(100 + (unsigned long)law);
+        RNG *rng = new_rng(100 + (unsigned long)law);
         const struct engine g = {(enum law)law, 0, 1, 1};
         int miss = 0, far = 0;
         for (int run = 0; run < RUNS; run++) {
-            struct converge_reference ref = make_reference(rng, &g, 1024, 16);
+            REFERENCE ref = make_reference(rng, &g, 1024, 16);
             struct rung rung[RUNGS];
             climb(rng, &g, &ref, K, rung);
             struct estimate slope = convergence_rate_slope(rung, RUNGS);
             miss += convergence_rate_slope_verdict(slope, 0.05, 1e9) == VERDICT_DIFFERENT;
             far += convergence_rate_slope_verdict(slope, 1e-3, 1e9) == VERDICT_DIFFERENT;
-            convergence_rate_reference_free(&ref);
         }
         char what[64];
         snprintf(what, sizeof what, "slope, %s", name[law]);
         assert_rate(what, miss, RUNS, rate[law][0]);
         assert_rate(what, far, RUNS, rate[law][1]);
-        gsl_rng_free(rng);
     }
 }
 
@@ -312,21 +316,19 @@ TEST(wrong_slopes_are_found)
         {"repeated samples: the variance does not fall", {EXPONENTIAL, 0, 0, 1}},
         {"a bias of 15 % bends the slope", {EXPONENTIAL, 0.15, 1, 1}},
     };
-    gsl_rng *rng = new_rng(2);
+    RNG *rng = new_rng(2);
     for (size_t c = 0; c < COUNT(control); c++) {
         int found = 0;
         for (int run = 0; run < 200; run++) {
-            struct converge_reference ref = make_reference(rng, &control[c].engine, 1024, 16);
+            REFERENCE ref = make_reference(rng, &control[c].engine, 1024, 16);
             struct rung rung[RUNGS];
             climb(rng, &control[c].engine, &ref, K, rung);
             found += convergence_rate_slope_verdict(convergence_rate_slope(rung, RUNGS), 1e-3,
                                                     0.1) == VERDICT_DIFFERENT;
-            convergence_rate_reference_free(&ref);
         }
         printf("%s: found %d of 200\n", control[c].name, found);
         assert_int_equal(found, 200);
     }
-    gsl_rng_free(rng);
 }
 
 /* A right slope with few, wild replicates is not called right. */
@@ -350,7 +352,7 @@ TEST(floor_keeps_its_error_rates)
     /* So that each law has a variance of 1 a sample. */
     static const double scale[] = {1, 0.2294157, 1.4142136};
     for (int law = EXPONENTIAL; law <= SHARED; law++) {
-        gsl_rng *rng = new_rng(300 + (unsigned long)law);
+        RNG *rng = new_rng(300 + (unsigned long)law);
         int above = 0, below = 0, good = 0, found = 0;
         for (int run = 0; run < RUNS; run++) {
             static float images[K * SIZE];
@@ -358,13 +360,12 @@ TEST(floor_keeps_its_error_rates)
             enum verdict v[3];
             for (int b = 0; b < 3; b++) {
                 const struct engine g = {(enum law)law, bias[b], 1, scale[law]};
-                struct converge_reference ref = make_reference(rng, &g, 1024, 16);
+                REFERENCE ref = make_reference(rng, &g, 1024, 16);
                 struct rung top;
                 struct err e;
                 render(rng, &g, 1024, K, images);
                 MUST(convergence_rate_rung(images, K, 1024, &ref, &top, &e));
                 v[b] = convergence_rate_floor_verdict(&top, 0.03, 0.05);
-                convergence_rate_reference_free(&ref);
             }
             above += v[0] == VERDICT_DIFFERENT;
             below += v[0] == VERDICT_EQUIVALENT;
@@ -380,7 +381,6 @@ TEST(floor_keeps_its_error_rates)
         assert_rate("bias at the margin called EQUIVALENT", below, RUNS, alpha);
         assert_int_equal(found, RUNS);
         assert_true(good > 0.9 * RUNS);
-        gsl_rng_free(rng);
     }
 }
 
@@ -389,17 +389,15 @@ TEST(floor_keeps_its_error_rates)
 TEST(a_floor_under_a_good_slope_is_found)
 {
     const struct engine g = {EXPONENTIAL, 0.05, 1, 0.5};
-    gsl_rng *rng = new_rng(4);
+    RNG *rng = new_rng(4);
     int found = 0;
     for (int run = 0; run < 200; run++) {
-        struct converge_reference ref = make_reference(rng, &g, 4096, 16);
+        REFERENCE ref = make_reference(rng, &g, 4096, 16);
         struct rung rung[RUNGS];
         climb(rng, &g, &ref, K, rung);
         found += convergence_rate_floor_verdict(&rung[RUNGS - 1], 0.01, 1e-3) == VERDICT_DIFFERENT;
-        convergence_rate_reference_free(&ref);
     }
     assert_int_equal(found, 200);
-    gsl_rng_free(rng);
 }
 
 /* H0: the interval of the variance ratio misses the true one in alpha of all runs. 2000 runs a law, 5 %.
@@ -408,12 +406,12 @@ TEST(variance_ratio_covers)
 {
     enum { RUNS = 2000, MORE = 24 };
     for (int law = EXPONENTIAL; law <= SHARED; law++) {
-        gsl_rng *rng = new_rng(500 + (unsigned long)law);
+        RNG *rng = new_rng(500 + (unsigned long)law);
         const struct engine a = {(enum law)law, 0, 1, 1.3}, b = {EXPONENTIAL, 0, 1, 1};
         /* Of a sum of halves, one of them shared: (1/4 + 1/4) of the variance; 90 % black: E x^2 is 0.1 x
          * 200, less 1. */
         double of_law = law == SHARED ? 0.5 : law == BLACK ? 19 : 1;
-        struct converge_reference ref = make_reference(rng, &b, 1, 0);
+        REFERENCE ref = make_reference(rng, &b, 1, 0);
         static float images[MORE * SIZE];
         int miss = 0, one = 0;
         for (int run = 0; run < RUNS; run++) {
@@ -432,16 +430,14 @@ TEST(variance_ratio_covers)
         /* Shared noise: the same limit as of the slope. */
         assert_rate("variance ratio", miss, RUNS, law == SHARED ? 0.1 : 0.05);
         assert_true(law == SHARED || one > 0.95 * RUNS);
-        convergence_rate_reference_free(&ref);
-        gsl_rng_free(rng);
     }
 }
 
 TEST(bad_rungs_are_refused)
 {
-    gsl_rng *rng = new_rng(6);
+    RNG *rng = new_rng(6);
     const struct engine g = {EXPONENTIAL, 0, 1, 1};
-    struct converge_reference ref = make_reference(rng, &g, 1, 4);
+    REFERENCE ref = make_reference(rng, &g, 1, 4);
     static float images[4 * SIZE];
     struct rung r;
     struct err e;
@@ -454,8 +450,6 @@ TEST(bad_rungs_are_refused)
     for (size_t i = 0; i < SIZE; i++)
         ref.mean[i] = truth(i) / ref.unit[i];
     REFUSES(convergence_rate_rung(images, 4, 4096, &ref, &r, &e), "reference is noisier");
-    convergence_rate_reference_free(&ref);
-    gsl_rng_free(rng);
 }
 
 static json_t *results_with(json_t **scene)

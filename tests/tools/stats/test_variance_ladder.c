@@ -23,6 +23,14 @@ static double draw(gsl_rng *rng, enum law law)
 
 static const double variance_of[] = {1, 19};
 
+#define REFERENCE                                                                                  \
+    __attribute__((cleanup(convergence_rate_reference_free))) struct converge_reference
+static void rng_free(gsl_rng **rng)
+{
+    gsl_rng_free(*rng);
+}
+#define RNG __attribute__((cleanup(rng_free))) gsl_rng
+
 static gsl_rng *new_rng(unsigned long seed)
 {
     gsl_rng *rng = gsl_rng_alloc(gsl_rng_mt19937);
@@ -86,8 +94,8 @@ static void renders_free(struct renders *r)
 /* The definitions of the header, with the pixel's variance by leaving out each replicate in earnest. */
 TEST(estimates_are_their_definitions)
 {
-    gsl_rng *rng = new_rng(1);
-    struct converge_reference unit = make_unit();
+    RNG *rng = new_rng(1);
+    REFERENCE unit = make_unit();
     static struct renders r;
     OWN(variance_map) between, within;
     struct err e;
@@ -134,8 +142,6 @@ TEST(estimates_are_their_definitions)
     assert_near(between.tile[5].se, sqrt(w) / pixels, 1e-6);
     assert_near(within.tile[5].value, inside / pixels, 1e-6);
     renders_free(&r);
-    convergence_rate_reference_free(&unit);
-    gsl_rng_free(rng);
 }
 
 /* H0: at most alpha of the claims about a variance at its margin are DIFFERENT, and at most alpha of those EQUIVALENT.
@@ -145,8 +151,8 @@ static void check_rates(enum law law, unsigned long seed)
 {
     enum { RUNS = 600 };
     const double alpha = 0.05, margin = 0.1;
-    gsl_rng *rng = new_rng(seed);
-    struct converge_reference unit = make_unit();
+    RNG *rng = new_rng(seed);
+    REFERENCE unit = make_unit();
     static struct renders r, s;
     struct err e;
     int different = 0, equivalent = 0, missed[2] = {0, 0};
@@ -182,8 +188,6 @@ static void check_rates(enum law law, unsigned long seed)
         if (all[i].wrong > 0)
             assert_true(gsl_cdf_binomial_Q((unsigned)all[i].wrong - 1, alpha, RUNS) >= 1e-4);
     }
-    convergence_rate_reference_free(&unit);
-    gsl_rng_free(rng);
 }
 
 TEST(rates_of_exponential_noise)
@@ -203,8 +207,8 @@ TEST(slopes_of_mostly_black_noise)
     const double alpha = 0.05;
     static const int spp[RUNGS] = {1, 4, 16, 64};
     static float images[K * SIZE];
-    gsl_rng *rng = new_rng(6);
-    struct converge_reference unit = make_unit();
+    RNG *rng = new_rng(6);
+    REFERENCE unit = make_unit();
     struct err e;
     int wrong[2] = {0, 0};
     for (int run = 0; run < 2 * RUNS; run++) {
@@ -231,15 +235,13 @@ TEST(slopes_of_mostly_black_noise)
     printf("slope: %d of %d wrong at 5 %%, control %d\n", wrong[0], RUNS, wrong[1]);
     assert_true(gsl_cdf_binomial_Q((unsigned)wrong[0], alpha, RUNS) >= 1e-4);
     assert_true(wrong[1] > RUNS / 2);
-    convergence_rate_reference_free(&unit);
-    gsl_rng_free(rng);
 }
 
 /* 3.1 times the variance is DIFFERENT at alpha 1e-6, a third of it is EQUIVALENT, but for a claim of two sides. */
 TEST(more_noise_is_found_and_less_is_not_an_error)
 {
-    gsl_rng *rng = new_rng(4);
-    struct converge_reference unit = make_unit();
+    RNG *rng = new_rng(4);
+    REFERENCE unit = make_unit();
     static struct renders r;
     struct variance_map map[3];
     struct err e;
@@ -259,8 +261,6 @@ TEST(more_noise_is_found_and_less_is_not_an_error)
                      VERDICT_DIFFERENT);
     for (int i = 0; i < 3; i++)
         variance_map_free(&map[i]);
-    convergence_rate_reference_free(&unit);
-    gsl_rng_free(rng);
 }
 
 /* What was without noise has to stay so; what had noise and has none is no increase. */
@@ -279,8 +279,8 @@ TEST(no_noise_is_asserted)
 /* Of mostly black noise, whose skewness is 6.5: the sign of M3 turned, and half of M3. */
 TEST(third_moments_that_cannot_be_are_an_error)
 {
-    gsl_rng *rng = new_rng(7);
-    struct converge_reference unit = make_unit();
+    RNG *rng = new_rng(7);
+    REFERENCE unit = make_unit();
     static struct renders r;
     OWN(variance_map) map;
     struct err e;
@@ -302,15 +302,13 @@ TEST(third_moments_that_cannot_be_are_an_error)
     }
     MUST(variance_ladder_within(r.m, K, &unit, TILE, &map, &e));
     renders_free(&r);
-    convergence_rate_reference_free(&unit);
-    gsl_rng_free(rng);
 }
 
 /* Replicates of which two are the same, with others that are not. */
 TEST(a_seed_without_effect_is_an_error)
 {
-    gsl_rng *rng = new_rng(5);
-    struct converge_reference unit = make_unit();
+    RNG *rng = new_rng(5);
+    REFERENCE unit = make_unit();
     static struct renders r;
     struct variance_map map;
     struct err e;
@@ -320,6 +318,4 @@ TEST(a_seed_without_effect_is_an_error)
     assert_false(variance_ladder_between(r.images, K, &unit, WIDTH, TILE, &map, &e));
     assert_string_equal(e.msg, "replicates with seeds of their own are the same image");
     renders_free(&r);
-    convergence_rate_reference_free(&unit);
-    gsl_rng_free(rng);
 }
