@@ -53,29 +53,41 @@ static void draw(double *factor, double spp)
         factor[p] = gsl_ran_gamma(rng, spp, 1 / spp);
 }
 
-/* What is known of an image: a share of its noise that of `other` (NULL: none), rounded to codes, times `scale`. */
-static struct noise_print noise_of(const double *own, const double *other, double share,
-                                   double scale)
+/* An image of this light, in codes: what is submitted. In arrays of one's own. */
+static struct submitted_image image_of(const double *light)
 {
     static double mean[3 * PIXELS], tolerance[3 * PIXELS];
     static unsigned char clipped[3 * PIXELS];
     struct submitted_image s = {
         .width = WIDTH, .height = HEIGHT, .mean = mean, .tolerance = tolerance, .clipped = clipped};
-    struct noise_print out;
     struct curve curve;
     struct err e;
-    double lo, hi;
-    assert_true(tone_curve_parse("cgl", &curve, &e));
-    tone_curve_bin(&curve, 255, 255, &lo, &hi);
-    s.clip = lo;
+    double hi;
+    MUST(tone_curve_parse("cgl", &curve, &e));
+    tone_curve_bin(&curve, 255, 255, &s.clip, &hi);
     for (size_t i = 0; i < 3 * PIXELS; i++) {
-        double factor = share * (other != NULL ? other[i / 3] : 0) + (1 - share) * own[i / 3];
-        int code = tone_map(TONE_CGL, scale * truth(i / 3) * factor);
+        double lo;
+        int code = tone_map(TONE_CGL, light[i / 3]);
         tone_curve_bin(&curve, code, 255, &lo, &hi);
         clipped[i] = code == 255;
         mean[i] = code == 255 ? s.clip : (lo + hi) / 2;
         tolerance[i] = code == 255 ? 0 : (hi - lo) / 2;
     }
+    return s;
+}
+
+/* What is known of an image: a share of its noise that of `other` (NULL: none), rounded to codes, times `scale`. */
+static struct noise_print noise_of(const double *own, const double *other, double share,
+                                   double scale)
+{
+    static double light[PIXELS];
+    struct noise_print out;
+    struct err e;
+    for (size_t p = 0; p < PIXELS; p++) {
+        double factor = share * (other != NULL ? other[p] : 0) + (1 - share) * own[p];
+        light[p] = scale * truth(p) * factor;
+    }
+    struct submitted_image s = image_of(light);
     MUST(same_noise_of(&s, &reference, SPP, &out, &e));
     return out;
 }
@@ -128,26 +140,6 @@ TEST(noise_of_others)
     }
     printf("the same noise: T at least %.1f; half of it: %.1f; bound %.1f\n", least, half, bound);
     assert_true(least > bound && half > bound);
-}
-
-/* An image of this noise, in codes: what is submitted. In arrays of one's own. */
-static struct submitted_image image_of(const double *mean_of)
-{
-    static double mean[3 * PIXELS], tolerance[3 * PIXELS];
-    static unsigned char clipped[3 * PIXELS];
-    struct curve curve;
-    struct err e;
-    double lo, hi;
-    MUST(tone_curve_parse("cgl", &curve, &e));
-    for (size_t i = 0; i < 3 * PIXELS; i++) {
-        int code = tone_map(TONE_CGL, mean_of[i / 3]);
-        tone_curve_bin(&curve, code, 255, &lo, &hi);
-        clipped[i] = code == 255;
-        mean[i] = (lo + hi) / 2;
-        tolerance[i] = (hi - lo) / 2;
-    }
-    return (struct submitted_image){
-        .width = WIDTH, .height = HEIGHT, .mean = mean, .tolerance = tolerance, .clipped = clipped};
 }
 
 /* H0: 300 programs with noise of their own, right or 20 % too bright on one half: T above 2.33 in about 1 % (normal law), so at
