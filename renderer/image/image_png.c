@@ -244,8 +244,8 @@ static const char *channel_of(const struct library_image *p, int c)
     return (p->channels < 3 ? grey : colours)[c];
 }
 
-/* Before the last row libpng has read no more than it needed; after it it would inflate all that is left, a thousandfold of
- * the file. Each pass of an interlaced file fills some pixels of the rows. */
+/* No data are longer than twice what they inflate to. Before the last row libpng has read no more than it needed; after it it would
+ * inflate all that is left, a thousandfold of the file. Each pass of an interlaced file fills some pixels of the rows. */
 static bool read_rows(struct library_image *p, uint8_t *rows, size_t size, png_uint_32 height)
 {
     if (setjmp(png_jmpbuf(p->png)))
@@ -255,6 +255,7 @@ static bool read_rows(struct library_image *p, uint8_t *rows, size_t size, png_u
     int passes = png_set_interlace_handling(p->png);
     png_read_update_info(p->png, p->info);
     assert(png_get_rowbytes(p->png, p->info) == size);
+    p->left = 2 * size * height + (1 << 16);
     for (int pass = 0; pass < passes; pass++)
         for (png_uint_32 y = 0; y < height; y++) {
             if (pass == passes - 1 && y == height - 1)
