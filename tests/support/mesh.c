@@ -75,19 +75,30 @@ struct scene mesh_ball(uint32_t rings, uint32_t segments, float bump)
     return s;
 }
 
-static vec3 random_point(uint32_t i, uint32_t k)
+vec3 mesh_random_point(uint64_t seed, uint32_t i, uint32_t k)
 {
-    struct sample4 s = sampler_get(31, i, k, 0, 0);
+    struct sample4 s = sampler_get(seed, i, k, 0, 0);
     return v3(2 * s.u[0] - 1, 2 * s.u[1] - 1, 2 * s.u[2] - 1);
+}
+
+struct mesh_bounds mesh_bounds(const struct scene *s)
+{
+    vec3 lo = s->position[0], hi = lo;
+    for (size_t i = 0; i < 3 * (size_t)s->num_triangles; i++) {
+        lo = vmin(lo, s->position[i]);
+        hi = vmax(hi, s->position[i]);
+    }
+    return (struct mesh_bounds){scale(add(lo, hi), 0.5f), length(sub(hi, lo)) / 2};
 }
 
 struct scene mesh_soup(uint32_t n)
 {
     struct scene s = new_mesh(n);
     for (uint32_t i = 0; i < n; i++) {
-        vec3 p = random_point(i, 0);
+        vec3 p = mesh_random_point(31, i, 0);
         float size = 0.3f * powf(0.01f, sampler_get(32, i, 0, 0, 0).u[0]);
-        set_triangle(&s, i, p, mad(p, size, random_point(i, 1)), mad(p, size, random_point(i, 2)));
+        set_triangle(&s, i, p, mad(p, size, mesh_random_point(31, i, 1)),
+                     mad(p, size, mesh_random_point(31, i, 2)));
     }
     return s;
 }
@@ -96,8 +107,9 @@ struct scene mesh_needles(uint32_t n)
 {
     struct scene s = new_mesh(n);
     for (uint32_t i = 0; i < n; i++) {
-        vec3 a = scale(random_point(i, 0), 0.3f), b = add(a, normalize(random_point(i, 1)));
-        set_triangle(&s, i, a, b, mad(b, 3e-4f, random_point(i, 2)));
+        vec3 a = scale(mesh_random_point(31, i, 0), 0.3f),
+             b = add(a, normalize(mesh_random_point(31, i, 1)));
+        set_triangle(&s, i, a, b, mad(b, 3e-4f, mesh_random_point(31, i, 2)));
     }
     return s;
 }

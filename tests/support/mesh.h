@@ -19,4 +19,13 @@ struct scene mesh_needles(uint32_t n);
 /* Every triangle of a terrain twice, the second time with other corners first. */
 struct scene mesh_twins(uint32_t n);
 
+struct mesh_bounds {
+    vec3 middle;
+    float size; /* half the diagonal */
+};
+struct mesh_bounds mesh_bounds(const struct scene *s);
+
+/* In [-1,1]^3, number (i, k) of that seed. */
+vec3 mesh_random_point(uint64_t seed, uint32_t i, uint32_t k);
+
 #endif

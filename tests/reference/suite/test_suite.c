@@ -398,11 +398,8 @@ static void expect_faults(const char *dir, const char *name, const char *text,
         char *wrong = edited(text, f[i].from, f[i].to);
         put(dir, name, wrong);
         free(wrong);
-        if (suite_load(test_path(dir), &s, &e))
-            fail_msg("accepted, wanted: %s", f[i].message);
+        REFUSES(suite_load(test_path(dir), &s, &e), f[i].message);
         assert_ptr_equal(strstr(e.msg, test_path(dir)), e.msg);
-        if (strstr(e.msg, f[i].message) == NULL || strchr(e.msg, '\n') != NULL)
-            fail_msg("no '%s' in: %s", f[i].message, e.msg);
     }
     put(dir, name, text);
 }

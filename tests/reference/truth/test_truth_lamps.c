@@ -266,9 +266,8 @@ TEST(plane_catches_the_cone)
                 double x = s->light[0] - half + side * col, z = s->light[2] - half + side * row;
                 double mean;
                 struct err e;
-                if (!truth_spot_mean(s, (double[2]){x, x + side}, (double[2]){z, z + side}, &mean,
-                                     &e))
-                    fail_msg("%s", e.msg);
+                MUST(truth_spot_mean(s, (double[2]){x, x + side}, (double[2]){z, z + side}, &mean,
+                                     &e));
                 flux += mean * side * side;
             }
         double n = s->exponent + 1, cone = 2 * M_PI * (1 - pow(s->cos_cutoff, n)) / n;

@@ -6,6 +6,7 @@
 #include "renderer/scene/shape.h"
 #include "renderer/math/warp.h"
 #include "tests/support/build_scene.h"
+#include "tests/support/mesh.h"
 #include "tests/support/test.h"
 
 enum { KINDS = BVH_WIDE + 1 };
@@ -14,8 +15,7 @@ enum layout { SCATTERED, COINCIDENT, FLAT, WIDE_RANGE, ONE, NUM_LAYOUTS };
 
 static vec3 random_point(uint32_t i, uint32_t k)
 {
-    struct sample4 s = sampler_get(11, i, k, 0, 0);
-    return v3(2 * s.u[0] - 1, 2 * s.u[1] - 1, 2 * s.u[2] - 1);
+    return mesh_random_point(11, i, k);
 }
 
 static struct scene make_scene(enum layout layout)

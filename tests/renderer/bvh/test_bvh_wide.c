@@ -14,23 +14,7 @@
 
 static vec3 random_point(uint32_t i, uint32_t k)
 {
-    struct sample4 s = sampler_get(51, i, k, 0, 0);
-    return v3(2 * s.u[0] - 1, 2 * s.u[1] - 1, 2 * s.u[2] - 1);
-}
-
-struct frame_of {
-    vec3 middle;
-    float size;
-};
-
-static struct frame_of frame_of(const struct scene *s)
-{
-    vec3 lo = s->position[0], hi = lo;
-    for (size_t i = 0; i < 3 * (size_t)s->num_triangles; i++) {
-        lo = vmin(lo, s->position[i]);
-        hi = vmax(hi, s->position[i]);
-    }
-    return (struct frame_of){scale(add(lo, hi), 0.5f), length(sub(hi, lo)) / 2};
+    return mesh_random_point(51, i, k);
 }
 
 enum aim {
@@ -46,7 +30,7 @@ enum aim {
 
 static const float tiny[] = {0, -0.0f, FLT_MIN / 8, -FLT_MIN / 8, 1e-30f, -1e-18f, 1e-10f};
 
-static ray make_ray(const struct scene *s, const struct frame_of *f, enum aim aim, uint32_t i)
+static ray make_ray(const struct scene *s, const struct mesh_bounds *f, enum aim aim, uint32_t i)
 {
     struct sample4 u = sampler_get(52, i, (uint32_t)aim, 0, 0);
     const vec3 *p = s->position + 3 * ((size_t)i * 7919 % s->num_triangles);
@@ -134,7 +118,7 @@ static void compare(const char *name, struct scene s, uint32_t batches, uint32_t
     struct bvh *wide[3], *sah = bvh_build(&s, BVH_SAH, &e),
                          *all = bvh_build(&s, BVH_BRUTE_FORCE, &e);
     int n = build_all(&s, wide);
-    struct frame_of f = frame_of(&s);
+    struct mesh_bounds f = mesh_bounds(&s);
     uint32_t hits = 0, ties = 0;
     for (uint32_t k = 0; k < batches; k++) {
         struct rays r;

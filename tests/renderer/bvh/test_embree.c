@@ -25,8 +25,7 @@
 
 static vec3 random_point(uint32_t i, uint32_t k)
 {
-    struct sample4 s = sampler_get(31, i, k, 0, 0);
-    return v3(2 * s.u[0] - 1, 2 * s.u[1] - 1, 2 * s.u[2] - 1);
+    return mesh_random_point(31, i, k);
 }
 
 struct bounds {
@@ -36,14 +35,9 @@ struct bounds {
 
 static struct bounds bounds_of(const struct scene *s)
 {
-    vec3 lo = s->position[0], hi = lo;
-    for (size_t i = 0; i < 3 * (size_t)s->num_triangles; i++) {
-        lo = vmin(lo, s->position[i]);
-        hi = vmax(hi, s->position[i]);
-    }
-    struct bounds b = {.middle = scale(add(lo, hi), 0.5f), .size = length(sub(hi, lo)) / 2};
-    b.magnitude = maxf(fabsf(b.middle.x), maxf(fabsf(b.middle.y), fabsf(b.middle.z))) + 3 * b.size;
-    return b;
+    const struct mesh_bounds b = mesh_bounds(s);
+    const vec3 m = b.middle;
+    return (struct bounds){m, b.size, maxf(fabsf(m.x), maxf(fabsf(m.y), fabsf(m.z))) + 3 * b.size};
 }
 
 enum aim { ANYWHERE, AT_VERTEX, AT_EDGE, GRAZING, ALONG_AXIS, NUM_AIMS };

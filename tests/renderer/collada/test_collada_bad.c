@@ -3,7 +3,6 @@
  * line that carries the comment <!-- fault -->; the expected line number is found by that comment,
  * not by the loader. */
 #define _GNU_SOURCE
-#include "renderer/base/fs.h"
 #include "renderer/collada/collada.h"
 #include "tests/support/test.h"
 
@@ -13,16 +12,14 @@
 /* 1-based; 0 if no line is marked. */
 static long marked_line(const char *path)
 {
-    FILE *f = fopen(path, "r");
-    assert_non_null(f);
-    char text[1024];
+    char *text = test_read(path), *rest = text, *at;
     long line = 0, marked = 0;
-    while (fgets(text, sizeof text, f) != NULL) {
+    while ((at = strsep(&rest, "\n")) != NULL) {
         line++;
-        if (strstr(text, "<!-- fault -->") != NULL)
+        if (strstr(at, "<!-- fault -->") != NULL)
             marked = line;
     }
-    fclose(f);
+    free(text);
     return marked;
 }
 
@@ -81,27 +78,23 @@ TEST(unreadable_file_is_an_error)
 }
 
 /* Writes a document of that body, which is as it stands. */
-static void write_document(const char *folder, const char *name, const char *body)
+static void write_document(const char *name, const char *body)
 {
-    char path[256], text[4096];
-    snprintf(path, sizeof path, "%s/%s", folder, name);
+    char text[4096];
     snprintf(
         text, sizeof text,
         "<COLLADA xmlns='http://www.collada.org/2005/11/COLLADASchema' version='1.4.1'>\n%s</COLLADA>",
         body);
-    test_write(path, text, strlen(text));
+    test_write_text(test_path(name), text);
 }
 
 /* A scene over four files: main.dae -> "part s.dae" (centimetres, Z_UP: a node and a geometry that name each other's file) ->
  * back, and a material of a third. The point (1,2,3) cm of Z_UP is (1,3,-2)/100 m in Y_UP. */
 TEST(scene_of_several_files)
 {
-    char folder[] = "/tmp/assay_files_XXXXXX", path[256];
-    assert_non_null(mkdtemp(folder));
-    snprintf(path, sizeof path, "%s/paint", folder);
-    assert_int_equal(mkdir(path, 0700), 0);
+    assert_int_equal(mkdir(test_path("paint"), 0700), 0);
     write_document(
-        folder, "main.dae",
+        "main.dae",
         "<library_geometries><geometry id='tri'><mesh><source id='p'><float_array id='a' count='9'>"
         "1 2 3 2 2 3 1 3 3</float_array><technique_common><accessor source='#a' count='3' stride='3'>"
         "<param name='X'/><param name='Y'/><param name='Z'/></accessor></technique_common></source>"
@@ -111,20 +104,21 @@ TEST(scene_of_several_files)
         "<instance_node url='part%20s.dae#here'/></node></visual_scene></library_visual_scenes>"
         "<scene><instance_visual_scene url='./main.dae#w'/></scene>");
     write_document(
-        folder, "part s.dae",
+        "part s.dae",
         "<asset><unit meter='.01'/><up_axis>Z_UP</up_axis></asset><library_nodes><node id='here'>"
         "<translate>1 2 3</translate><instance_geometry url='main.dae#tri'><bind_material>"
         "<technique_common><instance_material symbol='m' target='paint/red.dae#red'/></technique_common>"
         "</bind_material></instance_geometry></node></library_nodes>");
     write_document(
-        folder, "paint/red.dae",
+        "paint/red.dae",
         "<library_materials><material id='red'><instance_effect url='../paint/red.dae#red-fx'/></material>"
         "</library_materials><library_effects><effect id='red-fx'><profile_COMMON><technique sid='c'>"
         "<lambert><diffuse><color>.7 0 0 1</color></diffuse></lambert></technique></profile_COMMON></effect>"
         "</library_effects>");
     struct scene s = {0};
     struct err e = {""};
-    snprintf(path, sizeof path, "%s/main.dae", folder);
+    char path[256];
+    snprintf(path, sizeof path, "%s", test_path("main.dae"));
     MUST(collada_load(path, DIALECT_AUTO, &s, &e));
     assert_int_equal(s.num_triangles, 1);
     assert_int_equal(s.num_documents, 2);
@@ -136,9 +130,9 @@ TEST(scene_of_several_files)
         assert_true(length(sub(s.position[k], expected[k])) < 1e-5f);
     scene_free(&s);
     /* A fault has the name of its own file. */
-    write_document(folder, "paint/red.dae", "<library_materials/>");
+    write_document("paint/red.dae", "<library_materials/>");
     REFUSES(collada_load(path, DIALECT_AUTO, &s, &e), "part s.dae:2: no element with id 'red'");
-    write_document(folder, "paint/red.dae", "<library_materials><bad></library_materials>");
+    write_document("paint/red.dae", "<library_materials><bad></library_materials>");
     REFUSES(collada_load(path, DIALECT_AUTO, &s, &e), "paint/red.dae:2: not well-formed");
     /* Only files, and only of relative names; never from memory. */
     static const char *const urls[] = {"/etc/passwd#w", "http://example.org/a.dae#w",
@@ -148,13 +142,12 @@ TEST(scene_of_several_files)
     for (size_t i = 0; i < COUNT(urls); i++) {
         char body[256];
         snprintf(body, sizeof body, "<scene><instance_visual_scene url='%s'/></scene>", urls[i]);
-        write_document(folder, "main.dae", body);
+        write_document("main.dae", body);
         REFUSES(collada_load(path, DIALECT_AUTO, &s, &e), why[i]);
     }
     static const char text[] =
         "<COLLADA version='1.4.1'><scene><instance_visual_scene url='main.dae#w'/></scene></COLLADA>";
     REFUSES(collada_parse(text, strlen(text), path, DIALECT_AUTO, &s, &e), "leads elsewhere");
-    MUST(fs_remove_tree(folder, &e));
 }
 
 /* Without <scene>: the only <visual_scene>, nothing if there is none, and an error if there are two. */

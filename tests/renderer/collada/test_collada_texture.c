@@ -1,9 +1,8 @@
 /* Textures of COLLADA files: which file an image is, what its sampler says, and which coordinates an instance binds. */
 #include "renderer/base/fs.h"
 #include "renderer/collada/collada.h"
+#include "tests/support/build_scene.h"
 #include "tests/support/test.h"
-
-static char dir[] = "/tmp/assay-texture-XXXXXX";
 
 /* A quadrangle with corners (0,0), (1,0), (1,1), (0,1) and two sets of coordinates: of number 4 u = 1 - x, v = y, by vertex; of
  * number 7 u = 2 x, v = 3 y, with a third param. */
@@ -57,7 +56,7 @@ static bool load(struct pieces p, struct scene *s, struct err *e)
     int n = snprintf(text, sizeof text, DOCUMENT, p.image, p.sampler, p.channels, p.vertices,
                      p.inputs, p.scale, p.geometry, p.bind);
     assert_true(n > 0 && (size_t)n < sizeof text);
-    return collada_parse(text, (size_t)n, fs_path("%s/scene.dae", dir).s, DIALECT_COLLADA, s, e);
+    return collada_parse(text, (size_t)n, test_path("scene.dae"), DIALECT_COLLADA, s, e);
 }
 
 /* u = a + b x, v = c y at every corner of a quadrangle that may be mirrored in x. */
@@ -146,7 +145,8 @@ TEST(other_names)
         struct scene s;
         struct err e = {""};
         struct pieces p = PLAIN;
-        snprintf(uri, sizeof uri, forms[k], dir); // NOLINT(clang-diagnostic-format-nonliteral)
+        snprintf(uri, sizeof uri, forms[k],
+                 test_path(".")); // NOLINT(clang-diagnostic-format-nonliteral)
         snprintf(image, sizeof image, "<image id='i'><init_from>%s</init_from></image>", uri);
         p.image = image;
         MUST(load(p, &s, &e));
@@ -155,99 +155,74 @@ TEST(other_names)
     }
 }
 
-TEST(what_is_refused){
-#define WITH(field, text) {offsetof(struct pieces, field), text
-    static const struct {size_t field;
-const char *text, *says;
-}
-cases[] = {WITH(vertices, ""), NULL}, WITH(image, "<image id='i'/>"),
-    "scene.dae:2: <image> without <init_from>"
-}
-, WITH(image, "<image id='i'><init_from>none.png</init_from></image>"),
-    "none.png: cannot read: No such file"
-}
-, WITH(image, "<image id='i'><init_from>http://x/a.png</init_from></image>"),
-    "an image from 'http://x/a.png' is not"
-}
-, WITH(image, "<image id='i'><init_from>text.png</init_from></image>"),
-    "text.png: cannot read: not an OpenEXR, PNG"
-}
-, WITH(image, "<image id='i'><init_from>.</init_from></image>"), "cannot read: Is a directory"
-}
-, WITH(image, "<image id='i'><init_from>bright.exr</init_from></image>"),
-    "'m': reflectance outside [0,1] in its texture"
-}
-, WITH(sampler, "<wrap_s>MIRROR_ONCE</wrap_s>"),
-    "scene.dae:3: <wrap_s> is 'MIRROR_ONCE', not one of: WRAP"
-}
-, WITH(sampler, "<magfilter>CUBIC</magfilter>"), "<magfilter> is 'CUBIC', not one of: NEAREST"
-}
-, WITH(sampler, "<wrap_t>BORDER</wrap_t><border_color>1 0 0 1</border_color>"),
-    "<border_color> that is not black"
-}
-, WITH(geometry, "ball"), "scene.dae:6: a texture on a surface without texture coordinates"
-}
-, WITH(bind, BIND(5)), "scene.dae:6: no set 5 of texture coordinates"
-}
-, WITH(channels, DIFFUSE "<emission><texture texture='t' texcoord='OTHER'/></emission>"),
-    "a second set of texture coordinates in one material"
-}
-, WITH(channels, "<diffuse><texture texture='t'/><color>1 1 1</color></diffuse>"),
-    "unexpected <color> in <diffuse>"
-}
-,
-    WITH(
-        inputs,
-        "<input semantic='TEXCOORD' source='#p' offset='1'/><input semantic='TEXCOORD' source='#c' offset='1'/>"),
-    "no element with id 'c'"
-}
-,
-}
-;
-#undef WITH
-for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+#define OF(field) offsetof(struct pieces, field)
+
+TEST(what_is_refused)
+{
+    static const struct {
+        size_t field;
+        const char *text, *says; /* NULL: it is not */
+    } cases[] = {
+        {OF(vertices), "", NULL},
+        {OF(image), "<image id='i'/>", "scene.dae:2: <image> without <init_from>"},
+        {OF(image), "<image id='i'><init_from>none.png</init_from></image>",
+         "none.png: cannot read: No such file"},
+        {OF(image), "<image id='i'><init_from>http://x/a.png</init_from></image>",
+         "an image from 'http://x/a.png' is not"},
+        {OF(image), "<image id='i'><init_from>text.png</init_from></image>",
+         "text.png: cannot read: not an OpenEXR, PNG"},
+        {OF(image), "<image id='i'><init_from>.</init_from></image>",
+         "cannot read: Is a directory"},
+        {OF(image), "<image id='i'><init_from>bright.exr</init_from></image>",
+         "'m': reflectance outside [0,1] in its texture"},
+        {OF(sampler), "<wrap_s>MIRROR_ONCE</wrap_s>",
+         "scene.dae:3: <wrap_s> is 'MIRROR_ONCE', not one of: WRAP"},
+        {OF(sampler), "<magfilter>CUBIC</magfilter>",
+         "<magfilter> is 'CUBIC', not one of: NEAREST"},
+        {OF(sampler), "<wrap_t>BORDER</wrap_t><border_color>1 0 0 1</border_color>",
+         "<border_color> that is not black"},
+        {OF(geometry), "ball", "scene.dae:6: a texture on a surface without texture coordinates"},
+        {OF(bind), BIND(5), "scene.dae:6: no set 5 of texture coordinates"},
+        {OF(channels), DIFFUSE "<emission><texture texture='t' texcoord='OTHER'/></emission>",
+         "a second set of texture coordinates in one material"},
+        {OF(channels), "<diffuse><texture texture='t'/><color>1 1 1</color></diffuse>",
+         "unexpected <color> in <diffuse>"},
+        {OF(inputs),
+         "<input semantic='TEXCOORD' source='#p' offset='1'/><input semantic='TEXCOORD' source='#c' offset='1'/>",
+         "no element with id 'c'"},
+    };
     struct scene s;
     struct err e = {""};
-    struct pieces p = PLAIN;
-    memcpy((char *)&p + cases[k].field, &cases[k].text, sizeof cases[k].text);
-    if (cases[k].says == NULL) {
+    for (size_t k = 0; k < COUNT(cases); k++) {
+        struct pieces p = PLAIN;
+        memcpy((char *)&p + cases[k].field, &cases[k].text, sizeof cases[k].text);
+        if (cases[k].says != NULL) {
+            REFUSES(load(p, &s, &e), cases[k].says);
+            continue;
+        }
         MUST(load(p, &s, &e));
         scene_free(&s);
-        continue;
     }
-    REFUSES(load(p, &s, &e), cases[k].says);
-}
-struct scene s;
-struct err e = {""};
-struct pieces p = PLAIN;
-p.vertices = p.inputs = "";
-p.inputs = "<input semantic='NORMAL' source='#p' offset='1'/>";
-REFUSES(load(p, &s, &e), "a texture on a surface without texture coordinates");
+    struct pieces p = PLAIN;
+    p.vertices = "";
+    p.inputs = "<input semantic='NORMAL' source='#p' offset='1'/>";
+    REFUSES(load(p, &s, &e), "a texture on a surface without texture coordinates");
 }
 
 static int setup(void **state)
 {
     (void)state;
     struct err e;
-    struct image bright;
+    struct image bright = build_image(2, 2);
     const uint8_t pixel[3 * 6] = {0, 0, 0, 1, 1, 1, 2, 2, 2, 102, 10, 255, 4, 4, 4, 5, 5, 5};
-    if (mkdtemp(dir) == NULL || !fs_make_dirs(fs_path("%s/sub", dir).s, &e) ||
-        !image_write_png(fs_path("%s/sub/a b.png", dir).s, 3, 2, pixel, &e) ||
-        !image_write_png(fs_path("%s/sub/50%%.png", dir).s, 3, 2, pixel, &e) ||
-        !image_alloc(&bright, 2, 2, 3, (const char *const[]){"R", "G", "B"}, &e))
-        return -1;
     bright.data[4] = 1.5f;
-    bool ok = image_write_exr(fs_path("%s/bright.exr", dir).s, &bright, &e);
+    MUST(fs_make_dirs(test_path("sub"), &e) &&
+         image_write_png(test_path("sub/a b.png"), 3, 2, pixel, &e) &&
+         image_write_png(test_path("sub/50%.png"), 3, 2, pixel, &e) &&
+         image_write_exr(test_path("bright.exr"), &bright, &e));
     image_free(&bright);
-    FILE *f = fopen(fs_path("%s/text.png", dir).s, "w");
-    return ok && f != NULL && fputs("no image", f) > 0 && fclose(f) == 0 ? 0 : -1;
+    test_write_text(test_path("text.png"), "no image");
+    return 0;
 }
 
-static int teardown(void **state)
-{
-    (void)state;
-    struct err e;
-    return fs_remove_tree(dir, &e) ? 0 : -1;
-}
-
-TEST_GROUP(setup, teardown)
+TEST_GROUP(setup, NULL)

@@ -14,13 +14,10 @@
 
 static bool read_text(const char *text, struct camera *c, struct err *e)
 {
-    char path[] = "/tmp/assay_camera_XXXXXX";
-    int fd = mkstemp(path);
-    assert_true(fd >= 0 && write(fd, text, strlen(text)) == (ssize_t)strlen(text));
-    close(fd);
+    const char *path = test_path("camera");
+    test_write_text(path, text);
     *c = (struct camera){.width = 40, .height = 30};
     bool ok = camera_read_file(c, path, e);
-    unlink(path);
     if (!ok)
         assert_memory_equal(e->msg, path, strlen(path));
     return ok;
@@ -45,16 +42,14 @@ TEST(refuses_what_has_no_rays)
         {ANGLES POSITION ORBIT UPRIGHT SCREEN "4.7\n", "29 numbers"},
         {ANGLES POSITION ORBIT UPRIGHT SCREEN LENS "1", "more than the 30"},
     };
-    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+    for (size_t i = 0; i < COUNT(bad); i++) {
         struct camera c;
         struct err e = {""};
-        assert_false(read_text(bad[i].text, &c, &e));
-        if (strstr(e.msg, bad[i].why) == NULL)
-            fail_msg("'%s' does not say '%s'", e.msg, bad[i].why);
+        REFUSES(read_text(bad[i].text, &c, &e), bad[i].why);
     }
     /* The largest and the least that are taken. */
     static const char *const good[] = {"1e9 1e6\n", "1e-6 0\n"};
-    for (size_t i = 0; i < sizeof good / sizeof *good; i++) {
+    for (size_t i = 0; i < COUNT(good); i++) {
         char text[512];
         struct camera c;
         struct err e = {""};
@@ -204,7 +199,7 @@ TEST(filters_are_drawn_by_their_law)
 {
     static const char *const texts[] = {"box:1.25",    "tent:1",      "tent:0.5",
                                         "gauss:0.5:2", "gauss:0.5:3", "gauss:2:1"};
-    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
+    for (size_t i = 0; i < COUNT(texts); i++) {
         struct pixel_filter f;
         struct err e = {""};
         char text[PIXEL_FILTER_TEXT];
@@ -247,7 +242,7 @@ TEST(filters_are_refused)
     static const char *const bad[] = {
         "",         "mitchell",  "gauss",       "gauss:0.5:",   "tent:1:2", "box:x",
         "tent:0.4", "gauss:9:2", "gauss:nan:2", "gauss:0.5:17", "box:inf",  "tent:1 "};
-    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+    for (size_t i = 0; i < COUNT(bad); i++) {
         struct pixel_filter f;
         struct err e = {""};
         assert_false(pixel_filter_parse(bad[i], &f, &e));

@@ -3,6 +3,7 @@
  * would give, which the same test must reject. */
 #include "tests/support/render_check.h"
 #include "tests/support/sky.h"
+#include "tests/support/mesh.h"
 #include "tests/support/test.h"
 
 #include <gsl/gsl_integration.h>
@@ -434,10 +435,9 @@ TEST(choice_is_by_irradiance)
     scene_free(&s);
 }
 
-static vec3 random_vec3(uint32_t i, uint32_t k)
+static vec3 random_point(uint32_t i, uint32_t k)
 {
-    const struct sample4 u = sampler_get(11, i, k, 0, 0);
-    return v3(2 * u.u[0] - 1, 2 * u.u[1] - 1, 2 * u.u[2] - 1);
+    return mesh_random_point(11, i, k);
 }
 
 /* 300 spots, points, spheres and lamps of any size and direction in a cube, 200 places in it with normals: whatever a light's own
@@ -450,7 +450,7 @@ TEST(no_light_is_left_out)
     struct err e;
     struct scene s = build_scene();
     for (uint32_t i = 0; i < N / 3; i++) {
-        const vec3 at = random_vec3(i, 0), axis = normalize(random_vec3(i, 1));
+        const vec3 at = random_point(i, 0), axis = normalize(random_point(i, 1));
         build_light(&s, (struct light){.kind = i % 2 ? LIGHT_POINT : LIGHT_SPOT,
                                        .value = grey(1 + at.x),
                                        .position = at,
@@ -460,11 +460,11 @@ TEST(no_light_is_left_out)
                                        .exponent = 2 * fabsf(at.z)});
     }
     for (uint32_t i = N / 3; i < N; i++) {
-        const vec3 at = random_vec3(i, 0), size = scale(random_vec3(i, 1), i % 7 ? 0.1f : 0.7f);
+        const vec3 at = random_point(i, 0), size = scale(random_point(i, 1), i % 7 ? 0.1f : 0.7f);
         uint32_t m = build_material(&s, grey(0), grey(3 + at.z));
         s.materials[m].radiance_both_sides = i % 5 == 0;
         if (i % 3)
-            build_quad(&s, at, size, scale(random_vec3(i, 2), 0.1f), m);
+            build_quad(&s, at, size, scale(random_point(i, 2), 0.1f), m);
         else
             build_sphere(&s, at, length(size), i % 2 ? 1 : -1, m);
     }
@@ -475,7 +475,7 @@ TEST(no_light_is_left_out)
     assert_non_null(t);
     int left_out = 0, found = 0, never = 0;
     for (uint32_t k = 0; k < PLACES; k++) {
-        const vec3 p = random_vec3(N + k, 0), n = normalize(random_vec3(N + k, 1));
+        const vec3 p = random_point(N + k, 0), n = normalize(random_point(N + k, 1));
         double sum = 0, probability[N];
         int count[N] = {0};
         for (uint32_t l = 0; l < N; l++) {
