@@ -1,5 +1,6 @@
 #include "quadrature.h"
 #include "suite_files.h"
+#include "own.h"
 #include "test.h"
 
 #include "reference/truth/truth.h"
@@ -75,7 +76,7 @@ double mean_at(const struct moments *m, int col, int row, int channel)
 
 void expect_box_filter(const struct plane_scene *p, const int (*pixels)[2], size_t num)
 {
-    struct moments m;
+    OWN(moments) m;
     render_truth(p->name, 64, 64, &m);
     for (size_t i = 0; i < num; i++) {
         int col = pixels[i][0], row = pixels[i][1];
@@ -88,12 +89,11 @@ void expect_box_filter(const struct plane_scene *p, const int (*pixels)[2], size
             assert_true(same(mean_at(&m, col, row, c), p->albedo[c] * p->source[c] * mean / M_PI));
         assert_false(same(mean_at(&m, col, row, 0), p->albedo[0] * p->source[0] * centre / M_PI));
     }
-    moments_free(&m);
 }
 
 void expect_any_resolution(const char *name)
 {
-    struct moments coarse, fine;
+    OWN(moments) coarse, fine;
     render_truth(name, 64, 64, &coarse);
     render_truth(name, 128, 128, &fine);
     assert_string_equal(coarse.unit, "exact");
@@ -105,16 +105,13 @@ void expect_any_resolution(const char *name)
                     mean += mean_at(&fine, 2 * col + (k & 1), 2 * row + (k >> 1), c) / 4;
                 assert_true(same(mean_at(&coarse, col, row, c), mean));
             }
-    moments_free(&coarse);
-    moments_free(&fine);
 }
 
 void expect_refusal(const char *kind, const char *text, int depth, const char *message)
 {
     json_error_t why;
-    char *json = test_json(text);
+    OWN_TEXT json = test_json(text);
     json_t *values = json_loads(json, 0, &why);
-    free(json);
     assert_non_null(values);
     struct suite_scene scene = {.name = "19_bad",
                                 .width = 4,

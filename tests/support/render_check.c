@@ -1,4 +1,5 @@
 #include "render_check.h"
+#include "own.h"
 #include "test.h"
 
 #define ROUNDING 2e-5
@@ -66,9 +67,8 @@ struct check_result check_pool(const struct moments *m)
 struct check_result check_look(const struct scene *s, struct integrator_options io, int size,
                                int spp)
 {
-    struct moments m = check_render(s, io, size, size, spp);
+    OWN(moments) m = check_render(s, io, size, size, spp);
     struct check_result r = check_pool(&m);
-    moments_free(&m);
     return r;
 }
 

@@ -1,5 +1,6 @@
 #include "sky.h"
 #include "build_scene.h"
+#include "own.h"
 #include "test.h"
 
 #include <gsl/gsl_integration.h>
@@ -30,9 +31,8 @@ struct image sky_image(const struct sky *s)
 struct environment *sky_environment(const struct sky *s)
 {
     struct err e = {""};
-    struct image im = sky_image(s);
+    OWN(image) im = sky_image(s);
     struct environment *env = environment_from_image(&im, "sky", &e);
-    image_free(&im);
     MUST(env != NULL);
     return env;
 }

@@ -1,4 +1,5 @@
 #define _GNU_SOURCE
+#include "own.h"
 #include "test.h"
 
 #include "renderer/base/fs.h"
@@ -91,9 +92,8 @@ char *test_json(const char *text)
 
 void test_write_json(const char *path, const char *json)
 {
-    char *text = test_json(json);
+    OWN_TEXT text = test_json(json);
     test_write_text(path, text);
-    free(text);
 }
 
 static bool is_number(const char *at)

@@ -3,6 +3,7 @@
 #define _GNU_SOURCE
 
 #include "reference/base/process.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #include <dirent.h>
@@ -203,10 +204,9 @@ TEST(stdin_is_empty_and_the_directory_is_the_one_asked_for)
     const char *const argv[] = {"sh", "-c", "cat; pwd -P; exit 1", NULL};
     assert_false(
         process_run(&(struct process){.argv = argv, .cwd = dir, .timeout_s = 60}, NULL, &e));
-    char *real = realpath(dir, NULL);
+    OWN_TEXT real = realpath(dir, NULL);
     snprintf(want, sizeof want, "sh: exit status 1: %s", real);
     assert_string_equal(e.msg, want);
-    free(real);
     rmdir(dir);
     REFUSES(process_run(&(struct process){.argv = argv, .cwd = dir}, NULL, &e), "sh: cannot run: ");
 }

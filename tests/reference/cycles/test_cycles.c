@@ -3,6 +3,7 @@
 #include "cycles_probe.h"
 
 #include "renderer/base/fs.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #include <sys/stat.h>
@@ -33,14 +34,13 @@ static void stand_in(struct probe *f, const char *script)
 static void write_replicate(struct probe *f, int k, int width, float value, float first)
 {
     char path[128];
-    struct image im = build_image(width, 4);
+    OWN(image) im = build_image(width, 4);
     struct err e;
     snprintf(path, sizeof path, "%s/replicate_%04d.exr", f->work, k);
     for (int i = 0; i < width * 4 * 3; i++)
         im.data[i] = value;
     im.data[0] = first;
     MUST(image_write_exr(path, &im, &e));
-    image_free(&im);
 }
 
 static void assert_fails(struct probe *f, const char *why)
@@ -55,7 +55,7 @@ static void assert_fails(struct probe *f, const char *why)
 PROBE(replicates_are_folded_and_described)
 {
     struct err e;
-    struct moments m;
+    OWN(moments) m;
     json_t *manifest = json_object();
     plain_scene(f);
     for (int k = 0; k < 3; k++)
@@ -84,14 +84,13 @@ PROBE(replicates_are_folded_and_described)
                          replicate_seed(7, k));
     json_decref(file);
     json_decref(manifest);
-    moments_free(&m);
 }
 
 /* All pixels of all replicates alike: no random number had any effect. */
 PROBE(light_without_noise_is_exact)
 {
     struct err e;
-    struct moments m;
+    OWN(moments) m;
     json_t *manifest = json_object();
     plain_scene(f);
     for (int k = 0; k < 3; k++)
@@ -102,7 +101,6 @@ PROBE(light_without_noise_is_exact)
     for (int p = 0; p < 16; p++)
         assert_true(m.n[p] == 1 && m.mean[3 * p] == .25 && m.m2[3 * p] == 0);
     json_decref(manifest);
-    moments_free(&m);
 }
 
 PROBE(equal_replicates_are_refused)
@@ -135,8 +133,8 @@ static void write_noise(struct probe *f, int k, size_t own, uint64_t *random, st
 /* Different images all, but two were made with the same random numbers up to the last row. */
 PROBE(replicates_that_share_their_noise_are_refused)
 {
-    struct image im = build_image(16, 16);
-    struct moments m;
+    OWN(image) im = build_image(16, 16);
+    OWN(moments) m;
     struct err e;
     uint64_t random = 1;
     json_t *manifest = json_object();
@@ -151,12 +149,10 @@ PROBE(replicates_that_share_their_noise_are_refused)
     const json_t *test = json_object_get(manifest, "independence");
     assert_true(json_is_true(json_object_get(test, "tested")));
     assert_true(json_is_true(json_object_get(test, "passed")));
-    moments_free(&m);
     json_decref(manifest);
     for (int k = 0; k < 4; k++)
         write_noise(f, k, k == 3 ? 16 : 256, &random, &im);
     assert_fails(f, "Cycles: replicates 2 and 3 are not independent");
-    image_free(&im);
 }
 
 PROBE(unusable_images_are_refused)
@@ -299,7 +295,7 @@ PROBE(furnace_inside_a_sphere)
  * at that distance, so that two thirds of it are the front. */
 PROBE(only_fronts_emit)
 {
-    struct moments m;
+    OWN(moments) m;
     probe_size(f, 25, 40);
     f->suite.depth = 0;
     uint32_t glow = build_material(&f->s, grey(.5f), (rgb){1, 2, 3});
@@ -314,7 +310,6 @@ PROBE(only_fronts_emit)
         ok = ok &&
              (x == 12 ? fabs(m.mean[i] / (c + 1) - .66) < .05 : m.mean[i] == (x < 12 ? c + 1 : 0));
     }
-    moments_free(&m);
     assert_true(ok);
 }
 
@@ -323,7 +318,7 @@ PROBE(only_fronts_emit)
  * another meaning, such as the whole support of 12 sigmas, column 13 would see .001 and not .148. */
 PROBE(a_gauss_is_a_quarter_of_its_width)
 {
-    struct moments m;
+    OWN(moments) m;
     struct err e = {""};
     probe_size(f, 25, 40);
     f->suite.depth = 0;
@@ -341,5 +336,4 @@ PROBE(a_gauss_is_a_quarter_of_its_width)
         if (!(fabs(sum - want) < 0.0175))
             fail_msg("column %d: %g, not %g", x, sum, want);
     }
-    moments_free(&m);
 }

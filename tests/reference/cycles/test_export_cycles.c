@@ -4,6 +4,7 @@
 
 #include "reference/cycles/export_cycles.h"
 #include "renderer/image/image_oiio.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #include <sys/stat.h>
@@ -97,17 +98,15 @@ static char *dump(struct fixture *f, int depth)
 
 static void expect(struct fixture *f, int depth, const char *expected)
 {
-    char *text = dump(f, depth);
+    OWN_TEXT text = dump(f, depth);
     test_same_text(text, expected);
-    free(text);
 }
 
 static void expect_part(struct fixture *f, const char *part)
 {
-    char *text = dump(f, 1);
+    OWN_TEXT text = dump(f, 1);
     if (strstr(text, part) == NULL)
         fail_msg("no %s in %s", part, text);
-    free(text);
 }
 
 static void assert_refused(struct fixture *f, int depth, const char *why)
@@ -216,14 +215,14 @@ EXPORT(ambient_light)
 EXPORT(a_sky)
 {
     struct err e;
-    struct image got;
+    OWN(image) got;
     const struct sky sky = sky_uneven(8, 4);
     set_environment(f, sky_environment(&sky));
     expect_part(f, "\"environment\":{\n\"kind\":\"image\",\n\"file\":\"scene.json.exr\"}");
     const char *path = test_path("scene.json.exr");
     bool half = true;
     MUST(image_read(path, &got, &half, &e));
-    struct image want = sky_image(&sky);
+    OWN(image) want = sky_image(&sky);
     assert_true(!half && got.width == 8 && got.height == 4 && got.channels == 3);
     for (int i = 0; i < 8 * 4; i++)
         for (int c = 0; c < 3; c++) {
@@ -231,8 +230,6 @@ EXPORT(a_sky)
             int at_got = image_channel(&got, NAMES[c]), at_want = image_channel(&want, NAMES[c]);
             assert_true(got.data[3 * i + at_got] == want.data[want.channels * i + at_want]);
         }
-    image_free(&got);
-    image_free(&want);
     assert_int_equal(unlink(path), 0);
     assert_int_equal(mkdir(f->path, 0777), 0); /* in the dump's way */
     assert_false(export_cycles(&f->s, &f->c, 1, f->path, &e));
@@ -283,13 +280,13 @@ EXPORT(cameras_that_cycles_lacks_are_refused)
 EXPORT(textures_are_images_beside_the_dump)
 {
     const rgb texels[2] = {{.1f, .2f, 3}, {.4f, .5f, .6f}};
-    struct image im;
+    OWN(image) im;
     struct err e = {""};
     uint32_t map = build_texture(&f->s, 2, 1, texels, true, TEXTURE_MIRROR);
     f->s.textures[map - 1].wrap[1] = TEXTURE_BORDER;
     f->s.materials[1].radiance_map = map;
     f->s.lights[3].textured = true;
-    char *text = dump(f, 1);
+    OWN_TEXT text = dump(f, 1);
     char file[300];
     snprintf(file, sizeof file, "%s.texture0.exr", f->path);
     MUST(image_read_colours(file, &im, &e));
@@ -298,7 +295,6 @@ EXPORT(textures_are_images_beside_the_dump)
         const rgb want = i / 2 == 1 ? texels[i % 2] : grey(0);
         assert_memory_equal(im.data + 3 * i, &want, sizeof want);
     }
-    image_free(&im);
     if (strstr(
             text,
             "\"wrap\":[\"mirror\",\n\"clamp\"],\n\"size\":[2,1],\n\"pad\":[0,1],\n\"nearest\":true}") ==
@@ -308,7 +304,6 @@ EXPORT(textures_are_images_beside_the_dump)
         strstr(text, "\"uv\":[0.0,0.0,1.0,0.0,1.0,1.0,0.0,0.0,1.0,1.0,0.0,1.0]") == NULL ||
         strstr(text, "reflectance_map") != NULL)
         fail_msg("%s", text);
-    free(text);
     assert_int_equal(unlink(file), 0);
     f->c.tan_v *= 2;
     assert_refused(f, 1, "pixels are not square");

@@ -11,6 +11,7 @@
 #include "reference/replicates/engine_driver.h"
 #include "renderer/base/shell_quote.h"
 #include "tests/support/suite_files.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 enum { W = 4, H = 3, PIXELS = W * H, K = 3, SEED = 5 };
@@ -125,18 +126,17 @@ TEST(shipped_descriptions_load)
                                         "pathtracer_again", "blender", "c-ray"};
     for (size_t i = 0; i < COUNT(names); i++) {
         char path[128];
-        struct engine en;
+        OWN(engine) en;
         struct err e;
         snprintf(path, sizeof path, "reference/engines/%s.json", names[i]);
         MUST(engine_load(path, &en, &e));
         assert_string_equal(en.name, names[i]);
-        engine_free(&en);
     }
 }
 
 TEST(members_are_read)
 {
-    struct engine en;
+    OWN(engine) en;
     must_load("{'name': 'a-1', 'format': 'cycles', 'output': 'mean', 'image': 'hdr',"
               "'command': ['x', '{scene}', '{out}', '{seed}'], 'expresses': ['mirror'],"
               "'depth_offset': -1, 'spp': 9, 'replicates': 11}",
@@ -149,7 +149,6 @@ TEST(members_are_read)
     assert_int_equal(en.depth_offset, -1);
     assert_int_equal(en.spp, 9);
     assert_int_equal(en.replicates, 11);
-    engine_free(&en);
 }
 
 /* Each replaces one member of a good description, or adds one; NULL: leaves it out. */
@@ -265,7 +264,7 @@ TEST(a_dae_needs_its_lens_on_the_command_line)
 
 TEST(placeholders_are_filled_in)
 {
-    struct engine en;
+    OWN(engine) en;
     struct err e;
     char **argv;
     must_load("{'name': 'x', 'format': 'pbrt', 'output': 'mean', 'expresses': [],"
@@ -283,7 +282,6 @@ TEST(placeholders_are_filled_in)
     assert_null(argv[0]);
     free(argv);
     REFUSES(engine_argv(&en, command, values + 1, &argv, &e), "no value for '{scene}'");
-    engine_free(&en);
 }
 
 TEST(scenes_know_what_they_need)
@@ -299,7 +297,7 @@ TEST(scenes_know_what_they_need)
     };
     for (size_t i = 0; i < COUNT(cases); i++) {
         const struct suite_scene *s = suite_shipped_scene(cases[i].name);
-        struct scene scene;
+        OWN(scene) scene;
         struct camera camera;
         struct err e;
         assert_non_null(s);
@@ -312,7 +310,6 @@ TEST(scenes_know_what_they_need)
         camera.far = 0.01f;
         assert_int_equal(features_of_scene(&scene, &camera),
                          cases[i].features | 1u << FEATURE_CLIP);
-        scene_free(&scene);
     }
 }
 
@@ -336,7 +333,7 @@ TEST(materials_and_lights_have_features)
         {{.radiance = {1, 1, 1}, .radiance_both_sides = true}, 1u << FEATURE_TWO_SIDED},
     };
     for (size_t i = 0; i < 13; i++) {
-        struct scene s = build_scene();
+        OWN(scene) s = build_scene();
         struct err e;
         unsigned want = 0;
         uint32_t m = build_like(&s, i < 9 ? of[i].m : (struct material){0});
@@ -367,13 +364,12 @@ TEST(materials_and_lights_have_features)
         assert_int_equal(features_check_textures("x", &s, &e), i != 12);
         assert_true(i != 12 ||
                     strcmp(e.msg, "x: the texture of material 'm' cannot be expressed") == 0);
-        scene_free(&s);
     }
 }
 
 TEST(what_cannot_be_expressed_is_said)
 {
-    struct engine en;
+    OWN(engine) en;
     struct err e;
     must_load("{'name': 'x', 'format': 'povray', 'output': 'mean', 'expresses': "
               "['diffuse', 'point'], 'command': ['x', '{scene}', '{out}', '{seed}']}",
@@ -386,15 +382,14 @@ TEST(what_cannot_be_expressed_is_said)
     en.feature = ~0u;
     deep.depth = 60;
     REFUSES(engine_expresses(&en, &deep, test_path("."), &e), "POV-Ray is verified to depth");
-    engine_free(&en);
 }
 
 /* Three images whose red is a pixel's number times 1, 2 and 5, each for one seed: mean 8/3, M2
  * sum (x - 8/3)^2 = 1 + 4 + 25 - 64/3 = 26/3, M3 = (-5/3)^3 + (-2/3)^3 + (7/3)^3 = 210/27. */
 TEST(replicates_are_folded)
 {
-    struct engine en;
-    struct moments m;
+    OWN(engine) en;
+    OWN(moments) m;
     json_t *manifest;
     struct err e;
     write_replicates(K);
@@ -444,8 +439,6 @@ TEST(replicates_are_folded)
     snprintf(want, sizeof want, "7 %d 4 3 2\n", point_plane.depth + 1);
     assert_string_equal(args, want);
     json_decref(manifest);
-    moments_free(&m);
-    engine_free(&en);
 }
 
 /* x, 2 x, 5 x: mean 8 x/3, M2 = 78 x^2/9 = 26 x^2/3; a tent of radius 1 in which pixels share samples makes that 2.25 times as
@@ -458,13 +451,12 @@ TEST(pixels_that_share_samples_count_as_noisier)
         struct engine en;
         write_replicates(K);
         engine_of_script("cp {here}/picture_$3.pfm $2 && grep -q triangle $1", more[i], &en);
-        struct moments m = must_render(&en, K);
+        OWN(moments) m = must_render(&en, K);
         for (int p = 0; p < PIXELS; p++) {
             double x = p + 1, m2 = (i == 0 ? 2.25 : 1) * 26 / 3 * x * x;
             assert_true(fabs(m.mean[3 * p] - 8 * x / 3) < 1e-6 * x);
             assert_true(fabs(m.m2[3 * p] - m2) < 1e-5 * m2);
         }
-        moments_free(&m);
     }
 }
 
@@ -479,7 +471,7 @@ TEST(channels_are_rendered_apart)
     write_replicates(3 * K);
     engine_of_script("cp {here}/picture_$3.pfm $2 && cp $1 {here}/scene_$3",
                      ", 'channels': 'separate'", &en);
-    struct moments m = must_render(&en, (size_t)3 * K);
+    OWN(moments) m = must_render(&en, (size_t)3 * K);
     for (int p = 0; p < PIXELS; p++) {
         double x = p + 1;
         assert_true(m.n[p] == K);
@@ -490,12 +482,10 @@ TEST(channels_are_rendered_apart)
     for (int k = 0; k < 3 * K; k++) {
         char name[64];
         snprintf(name, sizeof name, "scene_%u", replicate_seed(SEED, k));
-        char *text = test_read(test_path(name));
+        OWN_TEXT text = test_read(test_path(name));
         assert_non_null(strstr(text, grey[k % 3][0]));
         assert_non_null(strstr(text, grey[k % 3][1]));
-        free(text);
     }
-    moments_free(&m);
 }
 
 TEST(images_without_noise_are_exact)
@@ -569,7 +559,7 @@ TEST(programs_that_misbehave_are_errors)
         {"cp {here}/ramp.pfm $2", "replicate 1 is the same image as an earlier one: the seed has"},
     };
     for (size_t i = 0; i < COUNT(cases); i++) {
-        struct engine en;
+        OWN(engine) en;
         struct moments m;
         json_t *manifest;
         struct err e = {0};
@@ -577,9 +567,8 @@ TEST(programs_that_misbehave_are_errors)
         REFUSES(render(&en, &point_plane, &m, &manifest, &e), cases[i].error);
         assert_non_null(strstr(e.msg, "12_point_plane, fake"));
         assert_non_null(strstr(e.msg, "(see "));
-        engine_free(&en);
     }
-    struct engine en;
+    OWN(engine) en;
     struct moments m;
     json_t *manifest;
     struct err e = {0};
@@ -589,13 +578,12 @@ TEST(programs_that_misbehave_are_errors)
     assert_false(render(&en, &point_plane, &m, &manifest, &e));
     /* Beside the description, not where we stand. */
     assert_non_null(strstr(e.msg, test_path("./no-such-program: no such program")));
-    engine_free(&en);
 }
 
 /* No name or ending says two engines, each can be asked to export, and those with goldens, which come first, are driven. */
 TEST(the_table_is_bound)
 {
-    struct scene scene;
+    OWN(scene) scene;
     struct camera camera;
     struct err e;
     int num = 0;
@@ -616,7 +604,6 @@ TEST(the_table_is_bound)
     assert_null(engine_names[NUM_ENGINES_WITH_GOLDENS]);
     assert_null(engine_kind_of("truth"));
     assert_null(engine_driver_of("mitsuba_"));
-    scene_free(&scene);
 }
 
 TEST_GROUP(set_up, NULL)

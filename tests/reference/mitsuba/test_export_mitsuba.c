@@ -6,6 +6,7 @@
 #include "reference/mitsuba/export_mitsuba.h"
 #include "renderer/image/image_oiio.h"
 #include "renderer/scene/environment.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #define EXPECTED "tests/reference/mitsuba/"
@@ -14,9 +15,8 @@ static void expect(const struct scene *s, const struct camera *c, const char *ex
 {
     struct err e;
     MUST(export_mitsuba(s, c, 3, test_path("scene.xml"), &e));
-    char *text = test_read(test_path("scene.xml"));
+    OWN_TEXT text = test_read(test_path("scene.xml"));
     test_same_text(text, expected);
-    free(text);
 }
 
 /* The bytes of a PLY file as numbers, vertices of n floats. */
@@ -96,7 +96,7 @@ TEST(the_text_is_that_of_the_description)
          .reflectance = {.875f, .75f, .625f}},
     };
     struct err e;
-    struct scene s = build_scene();
+    OWN(scene) s = build_scene();
     for (size_t i = 0; i < COUNT(all); i++)
         build_like(&s, all[i]);
     build_quad(&s, v3(-1, 0, -5), v3(2, 0, 0), v3(0, 3, 0.5f), 0);
@@ -121,12 +121,10 @@ TEST(the_text_is_that_of_the_description)
     expect_ply("scene_object_0.ply", 3);
     expect_ply("scene_object_1.ply", 3);
     expect_ply("scene_object_2.ply", 6);
-    struct image im = read_image("scene_material_4_eta.exr");
+    OWN(image) im = read_image("scene_material_4_eta.exr");
     for (int i = 0; i < im.width * im.height; i++)
         assert_true(im.data[3 * i] == .25f && im.data[3 * i + 1] == 1.5f &&
                     im.data[3 * i + 2] == 1.25f);
-    image_free(&im);
-    scene_free(&s);
 }
 
 /* Mitsuba's radiance from direction w: local = to_world^-1 w, u = atan2(x, -z) / 2 pi, v = acos(y) / pi;
@@ -165,15 +163,15 @@ TEST(environment_images)
     /* to_world of environment.xml.expected */
     const double m[16] = {0, 0, 1, 0, 0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 0, 1};
     struct err e;
-    struct image im = build_image(6, 5);
+    OWN(image) im = build_image(6, 5);
     srand(7);
     for (int i = 0; i < 6 * 5 * 3; i++)
         im.data[i] = (float)(rand() % 1000) / 100;
-    struct scene s = lit_by(sun);
+    OWN(scene) s = lit_by(sun);
     struct camera c = build_finish(&s, 40, 30);
     assert_true(scene_add_environment(&s, environment_from_image(&im, "test", &e), &e));
     expect(&s, &c, EXPECTED "environment.xml.expected");
-    struct image got = read_image("scene_environment.exr");
+    OWN(image) got = read_image("scene_environment.exr");
     for (int i = 0; i < 2000; i++) {
         double y = 1 - 2 * (i + .5) / 2000, phi = 2.399963 * i, r = sqrt(1 - y * y);
         vec3 w = v3((float)(r * cos(phi)), (float)y, (float)(r * sin(phi)));
@@ -193,9 +191,6 @@ TEST(environment_images)
                                  (double)environment_radiance(s.environment, w).r));
     }
     assert_true(worst > 0.1);
-    image_free(&im);
-    image_free(&got);
-    scene_free(&s);
 }
 
 static void refuse(struct scene *s, struct camera *c, const char *why)

@@ -6,6 +6,7 @@
 #include "reference/pbrt/export_pbrt.h"
 #include "renderer/scene/environment.h"
 #include "renderer/image/image_oiio.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #include <gsl/gsl_math.h>
@@ -44,7 +45,7 @@ TEST(the_text_is_that_of_the_description)
         {.reflectance = {.5f, 0, 0}, .radiance = {1, 2, 3}},
     };
     struct err e;
-    struct scene s = build_scene();
+    OWN(scene) s = build_scene();
     for (size_t i = 0; i < COUNT(all); i++)
         build_like(&s, all[i]);
     build_quad(&s, v3(-1, 0, -5), v3(2, 0, 0), v3(0, 3, 0.5f), 0);
@@ -68,7 +69,6 @@ TEST(the_text_is_that_of_the_description)
     text = export(&s, &c);
     test_same_text(text, "tests/reference/pbrt/scene.expected");
     free(text);
-    scene_free(&s);
 }
 
 static struct scene triangle_of(struct material m)
@@ -102,7 +102,7 @@ TEST(grey_mirrors_reflect_a_part)
         {.kind = MATERIAL_MIRROR, .reflectance = {.39996f, .39996f, .39996f}},
         {.kind = MATERIAL_MICROFACET, .alpha = .5f, .reflectance = {.39996f, .39996f, .39996f}}};
     for (int i = 0; i < 2; i++) {
-        struct scene s = triangle_of(grey_ones[i]);
+        OWN(scene) s = triangle_of(grey_ones[i]);
         struct camera c = build_finish(&s, 40, 30);
         char *text = export(&s, &c), *at = strstr(text, "\"float amount\" [");
         assert_non_null(at);
@@ -111,7 +111,6 @@ TEST(grey_mirrors_reflect_a_part)
         at[strcspn(at, "\n") + 1] = '\0';
         assert_memory_equal(at, expected[i], strlen(at));
         free(text);
-        scene_free(&s);
     }
 }
 
@@ -153,13 +152,12 @@ TEST(environment_images)
     srand(7);
     for (int i = 0; i < 6 * 5 * 3; i++)
         im.data[i] = (float)(rand() % 1000) / 100;
-    struct scene s = triangle_of((struct material){.reflectance = {1, 1, 1}});
+    OWN(scene) s = triangle_of((struct material){.reflectance = {1, 1, 1}});
     struct camera c = build_finish(&s, 40, 30);
     assert_true(scene_add_environment(&s, environment_from_image(&im, "test", &e), &e));
-    char *text = export(&s, &c);
+    OWN_TEXT text = export(&s, &c);
     assert_non_null(strstr(
         text, "\nLightSource \"infinite\" \"string filename\" [\"scene_environment.exr\"]\n"));
-    free(text);
     bool half;
     MUST(image_read(test_path("scene_environment.exr"), &got, &half, &e));
     assert_false(half);
@@ -213,7 +211,6 @@ TEST(environment_images)
     assert_true(scene_add_environment(&tall, environment_from_image(&im, "test", &e), &e));
     refuse(&tall, "of 513 rows, at most 512");
     image_free(&im);
-    scene_free(&s);
 }
 
 TEST(what_it_has_not_is_refused)

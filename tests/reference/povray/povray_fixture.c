@@ -1,4 +1,5 @@
 #include "povray_fixture.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #include "tests/support/render_check.h"
@@ -93,14 +94,13 @@ void render_ours(struct fixture *f, int depth, double mean[3], double variance[3
                                .num_samples = 4096,
                                .threads = 2};
     o.integrator.roulette = ROULETTE_OFF;
-    struct moments m = check_render_all(&f->s, &f->c, &o, BVH_SAH, NULL);
+    OWN(moments) m = check_render_all(&f->s, &f->c, &o, BVH_SAH, NULL);
     for (int k = 0; k < 3; k++) {
         mean[k] = image_mean(&m, k);
         variance[k] = 0;
         for (int i = 0; i < m.width * m.height; i++)
             variance[k] += moments_var_of_mean(&m, (size_t)i, k) / pow(m.width * m.height, 2);
     }
-    moments_free(&m);
 }
 
 bool means_agree(double x[CALLS][3], int channel, double ours, double variance)

@@ -6,6 +6,7 @@
 #include "reference/povray/povray_lamp.h"
 #include "reference/povray/povray_replicate_parts.h"
 #include "povray_fixture.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #include <gsl/gsl_math.h>
@@ -107,7 +108,7 @@ static void refused(struct scene *s, const struct camera *c, int depth, const ch
 
 TEST(test_camera_refused)
 {
-    struct scene s = floor_and_ball(true);
+    OWN(scene) s = floor_and_ball(true);
     struct camera c = build_finish(&s, 40, 30), bad;
     bad = c;
     bad.lens_radius = .01f;
@@ -123,45 +124,40 @@ TEST(test_camera_refused)
     struct povray_passes p;
     struct err e;
     assert_true(povray_passes(&s, &c, 21, &p, &e));
-    scene_free(&s);
 }
 
 TEST(test_small_scene_refused)
 {
-    struct scene s = build_scene();
+    OWN(scene) s = build_scene();
     build_sphere(&s, v3(0, 0, 0), .01f, 1, build_material(&s, grey(.5f), grey(0)));
     build_camera(&s, v3(0, 0, 1), 60);
     struct camera c = build_finish(&s, 40, 30);
     refused(&s, &c, 1, "tolerances");
-    scene_free(&s);
 }
 
 TEST(test_normals_refused)
 {
-    struct scene s = floor_and_ball(true);
+    OWN(scene) s = floor_and_ball(true);
     s.normal[4] = v3(0, -1, 0);
     struct camera c = build_finish(&s, 40, 30);
     refused(&s, &c, 1, "behind its triangle");
-    scene_free(&s);
 }
 
 TEST(test_lights_refused)
 {
     static const float falloff[][3] = {{0, 1, 0}, {1, 0, 1}, {1, 1, 0}};
     for (size_t i = 0; i < COUNT(falloff); i++) {
-        struct scene s = floor_and_ball(false);
+        OWN(scene) s = floor_and_ball(false);
         struct light l = {.kind = LIGHT_POINT, .value = {1, 1, 1}, .position = {0, 1, 0}};
         memcpy(l.attenuation, falloff[i], sizeof l.attenuation);
         build_light(&s, l);
         struct camera c = build_finish(&s, 40, 30);
         refused(&s, &c, 1, "falloff");
-        scene_free(&s);
     }
-    struct scene tinted = floor_and_ball(false);
+    OWN(scene) tinted = floor_and_ball(false);
     build_sphere(&tinted, v3(0, 2, 0), .2f, 1, build_material(&tinted, (rgb){.5f, 0, 0}, grey(3)));
     struct camera c = build_finish(&tinted, 40, 30);
     refused(&tinted, &c, 1, "does not reflect");
-    scene_free(&tinted);
 }
 
 /* Two texels along u, mirrored, on coordinates 0 .. 1.5 times 2: texels 0 to 3 and one more to each side, the fourth of which is the
@@ -170,7 +166,7 @@ TEST(test_textures)
 {
     const rgb texels[2] = {{.125f, .25f, .5f}, {.75f, .5f, .25f}};
     for (int nearest = 0; nearest < 2; nearest++) {
-        struct scene s = floor_and_ball(true);
+        OWN(scene) s = floor_and_ball(true);
         struct povray_lamp lamp;
         uint32_t map = build_texture(&s, 2, 1, texels, nearest, TEXTURE_MIRROR);
         for (size_t k = 6; k < 12; k++)
@@ -179,7 +175,7 @@ TEST(test_textures)
         struct camera c = build_finish(&s, 40, 30);
         assert_false(povray_lamp(&s, &s.lights[0], &lamp));
         const struct povray_variant v = povray_variant_plain();
-        char *text = povray_text(&s, &c, 1, &v);
+        OWN_TEXT text = povray_text(&s, &c, 1, &v);
         static const char *const parts[2][4] = {
             {"function { x*0.33333333333333331 - -0.16666666666666666 } color_map {\n      [0.0833333333 rgb <0.375,0.5,0.5>] "
              "[0.25 rgb <0.375,0.5,0.5>] [0.416666667 rgb <2.25,1,0.25>] [0.583333333 rgb <2.25,1,0.25>]\n      "
@@ -192,8 +188,6 @@ TEST(test_textures)
         for (int i = 0; i < 4; i++)
             if (strstr(text, parts[nearest][i]) == NULL)
                 fail_msg("no %s in %.900s", parts[nearest][i], strstr(text, "uv_mapping"));
-        free(text);
-        scene_free(&s);
     }
 }
 
@@ -219,7 +213,7 @@ TEST(test_textures_refused)
         const rgb texels[2] = {{.1f, .2f, .5f}, {.7f, .5f, .3f}};
         struct err e = {""};
         struct povray_passes p;
-        struct scene s = floor_and_ball(true);
+        OWN(scene) s = floor_and_ball(true);
         s.materials[1].radiance_map =
             build_texture(&s, 2, 1, texels, cases[i].nearest, TEXTURE_WRAP);
         s.materials[1].reflectance = cases[i].albedo;
@@ -229,7 +223,6 @@ TEST(test_textures_refused)
             MUST(povray_passes(&s, &c, 1, &p, &e));
         else
             REFUSES(povray_passes(&s, &c, 1, &p, &e), cases[i].says);
-        scene_free(&s);
     }
 }
 
@@ -239,7 +232,7 @@ TEST(test_lamp_any_numbering)
     const vec3 corner[4] = {{0, 1, 0}, {.5f, 1.25f, 0}, {.75f, 1.25f, 1}, {.25f, 1, 1}};
     for (int cut = 0; cut < 2; cut++)
         for (int turn = 0; turn < 9; turn++) {
-            struct scene s = floor_and_ball(false);
+            OWN(scene) s = floor_and_ball(false);
             uint32_t m = build_material(&s, grey(0), grey(2));
             vec3 first[3] = {corner[cut], corner[cut + 1], corner[cut + 2]};
             vec3 second[3] = {corner[cut], corner[cut + 2], corner[(cut + 3) % 4]};
@@ -260,14 +253,13 @@ TEST(test_lamp_any_numbering)
             vec3 n = cross(l.edge1, l.edge2);
             assert_near(fabsf(dot(n, l.normal)), l.area, 1e-6);
             assert_near(length(sub(l.normal, normalize(v3(4, -8, -1)))), 0, 1e-6);
-            scene_free(&s);
         }
 }
 
 TEST(test_not_a_lamp)
 {
     for (int what = 0; what < 4; what++) {
-        struct scene s = floor_and_ball(false);
+        OWN(scene) s = floor_and_ball(false);
         uint32_t m = build_material(&s, grey(what == 0 ? .5f : 0), grey(2));
         s.materials[m].radiance_both_sides = what == 1;
         build_quad(&s, v3(0, 2, 0), v3(1, 0, 0), v3(0, 0, 1), m);
@@ -281,7 +273,6 @@ TEST(test_not_a_lamp)
         assert_int_equal(povray_lamp(&s, &s.lights[0], &l), what >= 2);
         if (what >= 2)
             assert_int_equal(l.kind, what == 2 ? POVRAY_MESH : POVRAY_RECTANGLE);
-        scene_free(&s);
     }
 }
 
@@ -290,7 +281,7 @@ TEST(test_not_a_lamp)
  * Colour x points = radiance x area / (2 pi d^2), see reference/povray/README.md. */
 TEST(test_lamp_points)
 {
-    struct scene s = floor_and_ball(true);
+    OWN(scene) s = floor_and_ball(true);
     struct camera c = build_finish(&s, 40, 30);
     struct povray_variant v = povray_variant_plain();
     for (int jitter = 0; jitter < 2; jitter++) {
@@ -326,12 +317,11 @@ TEST(test_lamp_points)
             assert_near(colour[k] * n * 2 * 3.14159265358979 * d * d / (3 - k), .125, 1e-7);
         free(text);
     }
-    scene_free(&s);
 }
 
 TEST(test_jitter_follows_seed)
 {
-    struct scene s = floor_and_ball(true);
+    OWN(scene) s = floor_and_ball(true);
     struct camera c = build_finish(&s, 40, 30);
     struct povray_variant v = povray_variant_plain();
     v.rule = POVRAY_JITTER;
@@ -344,7 +334,6 @@ TEST(test_jitter_follows_seed)
     assert_string_not_equal(text[0], text[2]);
     for (int i = 0; i < 3; i++)
         free(text[i]);
-    scene_free(&s);
 }
 
 /* (x, y, z) -> (-y, x, z), without minus zero. */
@@ -358,7 +347,7 @@ TEST(test_rotation)
 {
     char *text[2];
     for (int by_hand = 0; by_hand < 2; by_hand++) {
-        struct scene s = floor_and_ball(true);
+        OWN(scene) s = floor_and_ball(true);
         build_point(&s, v3(.5f, 3, 2), (rgb){1, 2, 3});
         build_sun(&s, v3(.6f, .8f, 0), (rgb){1, 2, 3});
         struct camera c = build_finish(&s, 40, 30);
@@ -387,7 +376,6 @@ TEST(test_rotation)
         }
         v.roulette = 0;
         text[by_hand] = povray_text(&s, &c, 5, &v);
-        scene_free(&s);
     }
     assert_string_equal(text[0], text[1]);
     free(text[0]);
@@ -398,12 +386,12 @@ TEST(test_rotation)
  * unmoved image has there: -backward + (2 x 1/2) tan_h right + (2 x 1/4) tan_v up. */
 TEST(test_shift)
 {
-    struct scene s = floor_and_ball(true);
+    OWN(scene) s = floor_and_ball(true);
     struct camera c = build_finish(&s, 40, 30);
     struct povray_variant v = povray_variant_plain();
     v.shift_x = .5;
     v.shift_y = .25;
-    char *text = povray_text(&s, &c, 1, &v);
+    OWN_TEXT text = povray_text(&s, &c, 1, &v);
     double d[3], right[3], up[3];
     numbers_after(text, "\n  direction", d);
     numbers_after(text, "\n  right", right);
@@ -415,14 +403,12 @@ TEST(test_shift)
         assert_near(right[k], expected[1][k], 1e-6);
         assert_near(up[k], expected[2][k], 1e-6);
     }
-    free(text);
-    scene_free(&s);
 }
 
 /* Radiosity and roulette appear only where there is indirect light to find. */
 TEST(test_radiosity_on_demand)
 {
-    struct scene s = floor_and_ball(true);
+    OWN(scene) s = floor_and_ball(true);
     struct camera c = build_finish(&s, 40, 30);
     struct povray_variant v = povray_variant_plain();
     static const struct {
@@ -431,11 +417,9 @@ TEST(test_radiosity_on_demand)
     } cases[] = {{1, true, false, false}, {5, true, true, true}, {5, false, false, true}};
     for (size_t i = 0; i < COUNT(cases); i++) {
         v.indirect = cases[i].indirect;
-        char *text = povray_text(&s, &c, cases[i].depth, &v);
+        OWN_TEXT text = povray_text(&s, &c, cases[i].depth, &v);
         assert_int_equal(strstr(text, "recursion_limit 4") != NULL, cases[i].radiosity);
         assert_int_equal(strstr(text, "radiosity {") != NULL, cases[i].radiosity);
         assert_int_equal(strstr(text, "Fate") != NULL, cases[i].roulette);
-        free(text);
     }
-    scene_free(&s);
 }

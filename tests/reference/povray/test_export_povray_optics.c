@@ -7,6 +7,7 @@
 #include "reference/povray/povray_lamp.h"
 #include "renderer/scene/environment.h"
 #include "povray_fixture.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 static uint32_t build_glass(struct scene *s, enum material_kind kind)
@@ -58,7 +59,7 @@ static void refused(struct scene *s, int depth, const char *why)
 /* Light sources end a path of m bounces at m surfaces, a glow at m + 1. */
 TEST(test_passes)
 {
-    struct scene s = ball_of(MATERIAL_GLASS);
+    OWN(scene) s = ball_of(MATERIAL_GLASS);
     struct camera c = build_finish(&s, 40, 30);
     struct povray_passes p;
     struct err e;
@@ -73,12 +74,11 @@ TEST(test_passes)
     /* j diffuse surfaces take 3j/2 levels: a path of 10 surfaces, 8 of them diffuse and then a
      * mirror, needs 3 x 8/2 + 2. */
     assert_true(p.pass[0].levels_indirect >= 14 && p.pass[1].levels_indirect >= 14);
-    scene_free(&s);
 }
 
 TEST(test_glass_text)
 {
-    struct scene s = ball_of(MATERIAL_GLASS);
+    OWN(scene) s = ball_of(MATERIAL_GLASS);
     struct camera c = build_finish(&s, 40, 30);
     char *lit = text_of(&s, &c, 10, 0), *seen = text_of(&s, &c, 10, 1);
     for (int i = 0; i < 2; i++) {
@@ -96,7 +96,6 @@ TEST(test_glass_text)
     }
     free(lit);
     free(seen);
-    scene_free(&s);
 }
 
 TEST(test_mirror_and_refraction_text)
@@ -120,7 +119,7 @@ TEST(test_mirror_and_refraction_text)
 
 TEST(test_spot_text)
 {
-    struct scene s = ball_of(MATERIAL_DIFFUSE);
+    OWN(scene) s = ball_of(MATERIAL_DIFFUSE);
     build_light(&s, (struct light){.kind = LIGHT_SPOT,
                                    .value = {1, 1, 1},
                                    .position = {0, 1, 2},
@@ -129,11 +128,9 @@ TEST(test_spot_text)
                                    .exponent = 7,
                                    .attenuation = {1, 0, 0}});
     struct camera c = build_finish(&s, 40, 30);
-    char *text = text_of(&s, &c, 1, 0);
+    OWN_TEXT text = text_of(&s, &c, 1, 0);
     assert_non_null(
         strstr(text, "spotlight point_at <0,1,1>\n    tightness 7 radius 60 falloff 60 }"));
-    free(text);
-    scene_free(&s);
 }
 
 static void add_sky(struct scene *s, struct environment *env)
@@ -146,11 +143,10 @@ static void add_sky(struct scene *s, struct environment *env)
 static struct environment *image(int width, int height)
 {
     struct err e;
-    struct image im = build_image(width, height);
+    OWN(image) im = build_image(width, height);
     for (int i = 0; i < 3 * width * height; i++)
         im.data[i] = (float)i;
     struct environment *env = environment_from_image(&im, "test", &e);
-    image_free(&im);
     return env;
 }
 
@@ -184,13 +180,12 @@ TEST(test_sky_refused)
 {
     struct err e;
     for (int which = 0; which < 2; which++) {
-        struct scene s = ball_of(MATERIAL_DIFFUSE);
+        OWN(scene) s = ball_of(MATERIAL_DIFFUSE);
         struct camera c = build_finish(&s, 40, 30);
         struct povray_passes p;
         add_sky(&s, which == 0 ? environment_upper_half(grey(1), &e) : image(255, 2));
         REFUSES(povray_passes(&s, &c, 1, &p, &e),
                 which == 0 ? "only diffuse surfaces see" : "255 x 2");
-        scene_free(&s);
     }
 }
 
@@ -245,9 +240,8 @@ TEST(test_glass_meshes)
             continue;
         }
         struct camera c = build_finish(&s, 40, 30);
-        char *text = text_of(&s, &c, 10, 1);
+        OWN_TEXT text = text_of(&s, &c, 10, 1);
         assert_int_equal(strstr(text, "  no_reflection\n") != NULL, what == 3);
-        free(text);
         scene_free(&s);
     }
 }
@@ -255,7 +249,7 @@ TEST(test_glass_meshes)
 /* All lights at once: two passes, and no light is left out of both. */
 TEST(test_mixed_lights)
 {
-    struct scene s = ball_of(MATERIAL_DIFFUSE);
+    OWN(scene) s = ball_of(MATERIAL_DIFFUSE);
     build_point(&s, v3(0, 1, 2), grey(1));
     build_sphere(&s, v3(.75f, 1, 0), .125f, 1, build_material(&s, grey(0), grey(2)));
     build_sphere(&s, v3(-.75f, 1, 0), .125f, 1, build_material(&s, grey(.5f), grey(2)));
@@ -273,7 +267,6 @@ TEST(test_mixed_lights)
     assert_int_equal(count(seen, "emission"), 4);
     free(lit);
     free(seen);
-    scene_free(&s);
 }
 
 /* Points of a ball lie on it and look outwards; for a spiral of n points their mean is within 1/n or
@@ -283,7 +276,7 @@ TEST(test_lamp_points)
     enum { N = 256 };
     const double shift[3] = {.3, .6, .8};
     vec3 p[N], n[N], sum = {0};
-    struct scene s = build_scene();
+    OWN(scene) s = build_scene();
     build_sphere(&s, v3(1, 2, 3), .5f, 1, build_material(&s, grey(0), grey(2)));
     uint32_t m = build_material(&s, grey(0), grey(1));
     build_triangle(&s, v3(0, 0, 0), v3(1, 0, 0), v3(0, 0, -1), m);
@@ -312,19 +305,16 @@ TEST(test_lamp_points)
         else
             assert_int_equal(near, N / 4);
     }
-    scene_free(&s);
 }
 
 /* A sphere around the eye is turned inside out (export_povray.c says why). */
 TEST(test_sphere_around_the_eye)
 {
     for (int around = 0; around < 2; around++) {
-        struct scene s = ball_of(MATERIAL_DIFFUSE);
+        OWN(scene) s = ball_of(MATERIAL_DIFFUSE);
         build_sphere(&s, v3(0, 0, 0), around ? 9 : .125f, -1, 0);
         struct camera c = build_finish(&s, 40, 30);
-        char *text = text_of(&s, &c, 1, 0);
+        OWN_TEXT text = text_of(&s, &c, 1, 0);
         assert_int_equal(count(text, "  inverse\n"), around);
-        free(text);
-        scene_free(&s);
     }
 }

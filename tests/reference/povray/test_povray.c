@@ -7,6 +7,7 @@
 #include "reference/povray/povray_replicate_parts.h"
 #include "reference/truth/truth.h"
 #include "renderer/base/fs.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #include <gsl/gsl_math.h>
@@ -211,11 +212,10 @@ TEST(test_slow_start_is_tried_again)
 static const char *grey_exr(const char *name, int side)
 {
     struct err e;
-    struct image im = build_image(side, side);
+    OWN(image) im = build_image(side, side);
     for (int i = 0; i < 3 * side * side; i++)
         im.data[i] = .5f;
     MUST(image_write_exr(test_path(name), &im, &e));
-    image_free(&im);
     return test_path(name);
 }
 
@@ -308,7 +308,7 @@ TEST(test_direct_light)
                        build_material(&s, grey(0), value));
         fixture_init(&f, s, 16, 5);
         json_t *manifest = json_object();
-        struct moments m = must_render(&f, manifest);
+        OWN(moments) m = must_render(&f, manifest);
         assert_string_equal(m.unit, "exact");
         assert_true(m.n[0] == 1 && m.m2[0] == 0 && m.spp == 0);
         assert_int_equal(json_array_size(json_object_get(manifest, "seeds")), 0);
@@ -317,7 +317,6 @@ TEST(test_direct_light)
         assert_true(worst < 3e-4 && fabs(mean) < 3e-5);
         compare(&m, truth[i], rgb_scale(value, 1.001f), &worst, &mean);
         assert_false(worst < 3e-4 || fabs(mean) < 3e-5);
-        moments_free(&m);
         json_decref(manifest);
         fixture_free(&f);
     }
@@ -338,14 +337,13 @@ TEST(test_furnace)
         build_sphere(&s, v3(0, 0, 0), 2, -1, build_material(&s, albedo, emission));
         build_camera(&s, v3(.1f, .2f, 1), 60);
         fixture_init(&f, s, 8, depth);
-        struct moments m = must_render(&f, NULL);
+        OWN(moments) m = must_render(&f, NULL);
         assert_string_equal(m.unit, "exact");
         for (int i = 0; i < 3 * 8 * 8; i++) {
             double is = m.mean[i];
             assert_true(fabs(is / truth_furnace(e[i % 3], a[i % 3], depth) - 1) < 2.5e-4);
             assert_false(fabs(is / truth_furnace(e[i % 3], a[i % 3], depth + 1) - 1) < 2.5e-4);
         }
-        moments_free(&m);
         fixture_free(&f);
     }
 }
@@ -364,7 +362,7 @@ TEST(test_indirect_light)
     for (int i = 0; i < CALLS; i++) {
         f.opt.seed = 1000 + (uint32_t)i;
         json_t *manifest = json_object();
-        struct moments m = must_render(&f, manifest);
+        OWN(moments) m = must_render(&f, manifest);
         assert_string_equal(m.unit, "replicate");
         assert_true(m.n[0] == 4 && m.spp == 16);
         assert_int_equal(json_array_size(json_object_get(manifest, "seeds")), 4);
@@ -372,7 +370,6 @@ TEST(test_indirect_light)
             strstr(json_string_value(json_object_get(manifest, "version")), "POV-Ray 3"));
         for (int k = 0; k < 3; k++)
             x[i][k] = image_mean(&m, k);
-        moments_free(&m);
         json_decref(manifest);
     }
     render_ours(&f, 5, ours[0], variance[0]);

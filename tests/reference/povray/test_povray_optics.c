@@ -6,6 +6,7 @@
 #include "reference/truth/truth.h"
 #include "reference/truth/truth_one_lamp.h"
 #include "renderer/scene/environment.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #include <gsl/gsl_math.h>
@@ -90,12 +91,11 @@ TEST(test_spot_light)
         look_down(&s, .5f);
         build_spot(&s, v3(.2f, .7f, .1f), normalize(v3(-.3f, -1, .1f)), (float)spot.cos_cutoff, 3,
                    (rgb){2, 1, 3});
-        struct moments m = exact_image(s, 5);
+        OWN(moments) m = exact_image(s, 5);
         int used;
         assert_true(worst_pixel(&m, under_spot, &spot, .4, &used) < 5e-4);
         assert_true(cut ? used > SIZE * SIZE : used == 3 * SIZE * SIZE);
         assert_false(worst_pixel(&m, under_spot, &wrong, .4, &used) < 5e-4);
-        moments_free(&m);
     }
 }
 
@@ -120,12 +120,11 @@ TEST(test_ball_lamp)
                build_material(&s, (rgb){.8f, .5f, .3f}, grey(0)));
     build_sphere(&s, v3(0, 1, 0), .2f, 1, build_material(&s, grey(0), (rgb){4, 5, 3}));
     look_down(&s, .5f);
-    struct moments m = exact_image(s, 1);
+    OWN(moments) m = exact_image(s, 1);
     double radius = .2, wrong = .202;
     int used;
     assert_true(worst_pixel(&m, under_ball, &radius, 1, &used) < 1e-3);
     assert_false(worst_pixel(&m, under_ball, &wrong, 1, &used) < 1e-3);
-    moments_free(&m);
 }
 
 static void constant(double u, double v, const void *with, double out[3])
@@ -151,7 +150,7 @@ TEST(test_mirror_box)
         s.materials[m].radiance_both_sides = true;
         build_box(&s, v3(-1, -1, -1), v3(2, 2.5f, 2.25f), m);
         build_camera(&s, v3(.125f, .25f, .25f), 60);
-        struct moments image = exact_image(s, depth);
+        OWN(moments) image = exact_image(s, depth);
         double ought[3], more[3];
         int used;
         for (int k = 0; k < 3; k++) {
@@ -160,7 +159,6 @@ TEST(test_mirror_box)
         }
         assert_true(worst_pixel(&image, constant, ought, 1, &used) < 2.5e-4);
         assert_false(worst_pixel(&image, constant, more, 1, &used) < 2.5e-4);
-        moments_free(&image);
     }
 }
 
@@ -202,11 +200,10 @@ TEST(test_glass_slab)
         build_camera(&s, v3(0, 1, 0), 20);
         s.camera.backward = v3(0, .5f, sqrtf(.75f));
         s.camera.up = v3(0, sqrtf(.75f), -.5f);
-        struct moments image = exact_image(s, depth);
+        OWN(moments) image = exact_image(s, depth);
         int used, more = depth + 1;
         assert_true(worst_pixel(&image, slab_radiance, &depth, 1, &used) < 3e-4);
         assert_false(worst_pixel(&image, slab_radiance, &more, 1, &used) < 3e-4);
-        moments_free(&image);
     }
 }
 
@@ -252,12 +249,11 @@ static void sky_seen(double u, double v, const void *with, double out[3])
 static struct environment *sky(void)
 {
     struct err e;
-    struct image im = build_image(SKY_WIDTH, SKY_HEIGHT);
+    OWN(image) im = build_image(SKY_WIDTH, SKY_HEIGHT);
     for (int i = 0; i < 3 * SKY_WIDTH * SKY_HEIGHT; i++)
         im.data[i] = (float)sky_texel(i / 3 % SKY_WIDTH, i / 3 / SKY_WIDTH, i % 3);
     struct environment *env = environment_from_image(&im, "test", &e);
     assert_non_null(env);
-    image_free(&im);
     return env;
 }
 
@@ -278,12 +274,11 @@ TEST(test_sky)
         }
         fixture_init(&f, s, SIZE, 0);
         assert_true(scene_add_environment(&f.s, sky(), &e));
-        struct moments m = must_render(&f, NULL);
+        OWN(moments) m = must_render(&f, NULL);
         struct view right = {quarter, 0}, wrong = {quarter, M_PI / 360};
         int used;
         assert_true(worst_pixel(&m, sky_seen, &right, 1, &used) < 4e-4);
         assert_false(worst_pixel(&m, sky_seen, &wrong, 1, &used) < 4e-4);
-        moments_free(&m);
         fixture_free(&f);
     }
 }
@@ -327,12 +322,11 @@ TEST(test_optics_among_diffuse_surfaces)
     for (int i = 0; i < CALLS; i++) {
         f.opt.seed = 2000 + (uint32_t)i;
         json_t *manifest = json_object();
-        struct moments m = must_render(&f, manifest);
+        OWN(moments) m = must_render(&f, manifest);
         assert_int_equal(
             json_array_size(json_object_get(json_object_get(manifest, "settings"), "passes")), 2);
         for (int k = 0; k < 3; k++)
             x[i][k] = image_mean(&m, k);
-        moments_free(&m);
         json_decref(manifest);
     }
     render_ours(&f, 8, ours[0], variance[0]);

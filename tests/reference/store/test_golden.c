@@ -4,6 +4,7 @@
 #include "renderer/base/sha256.h"
 #include "renderer/base/fs.h"
 #include "reference/base/json_file.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 enum { WIDTH = 4, HEIGHT = 2, REPLICATES = 3, SPP = 16 };
@@ -75,7 +76,7 @@ static void assert_refused(struct fixture *f, const char *why)
 STORE(what_was_written_comes_back)
 {
     struct err e;
-    struct moments m;
+    OWN(moments) m;
     json_t *manifest;
     write_golden(f);
     MUST(golden_read(f->dir, &f->scene, &f->ref, &m, &manifest, &e));
@@ -93,7 +94,6 @@ STORE(what_was_written_comes_back)
     assert_true(sha256_file(f->exr, sha256, &e));
     assert_string_equal(json_string_value(json_object_get(manifest, "exr_sha256")), sha256);
     assert_null(json_object_get(f->manifest, "exr_sha256")); /* the caller's is untouched */
-    moments_free(&m);
     json_decref(manifest);
 }
 
@@ -113,7 +113,7 @@ STORE(the_same_moments_have_the_same_bytes)
 STORE(engines_share_a_manifest)
 {
     struct err e;
-    struct moments m;
+    OWN(moments) m;
     json_t *manifest;
     write_golden(f);
     json_t *other = json_deep_copy(f->manifest);
@@ -123,7 +123,6 @@ STORE(engines_share_a_manifest)
     write_golden(f); /* again: replaces its own entry only */
     strcpy(f->ref.engine, "povray");
     assert_true(golden_read(f->dir, &f->scene, &f->ref, &m, &manifest, &e));
-    moments_free(&m);
     json_decref(manifest);
     json_t *all = json_load_file(f->json, 0, NULL);
     assert_int_equal(json_object_size(all), 2);
@@ -177,11 +176,10 @@ STORE(an_image_without_its_manifest_is_refused)
 static void assert_first_value(struct fixture *f, double want)
 {
     struct err e = {""};
-    struct moments m;
+    OWN(moments) m;
     json_t *manifest;
     MUST(golden_read(f->dir, &f->scene, &f->ref, &m, &manifest, &e));
     assert_float_equal(m.mean[0], want, 1e-6);
-    moments_free(&m);
     json_decref(manifest);
 }
 
@@ -259,7 +257,7 @@ STORE(an_image_that_contradicts_its_manifest_is_refused)
 STORE(a_closed_form_with_other_numbers_is_refused)
 {
     struct err e;
-    struct moments m;
+    OWN(moments) m;
     json_t *back, *one = json_pack("{sf}", "radiance", 1.0),
                   *two = json_pack("{sf}", "radiance", 2.0);
     strcpy(f->ref.engine, "truth");
@@ -274,7 +272,6 @@ STORE(a_closed_form_with_other_numbers_is_refused)
     json_object_set(f->manifest, "values", one);
     assert_true(golden_write(f->dir, "12_plane", "truth", &f->m, f->manifest, &e));
     MUST(golden_read(f->dir, &f->scene, &f->ref, &m, &back, &e));
-    moments_free(&m);
     json_decref(back);
     f->ref.values = two;
     assert_refused(f, "the closed form's values have changed");

@@ -4,6 +4,7 @@
 #include "renderer/base/fs.h"
 #include "renderer/base/sha256.h"
 #include "tests/support/build_scene.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 static const char shipped[] = "reference/scenes";
@@ -33,7 +34,7 @@ static void load_shipped(struct suite *s)
  * for each scene. */
 TEST(shipped_suite_loads)
 {
-    struct suite s;
+    OWN(suite) s;
     load_shipped(&s);
     int closed_forms = 0, must_differ = 0;
     for (int i = 0; i < s.num_scenes; i++) {
@@ -59,12 +60,11 @@ TEST(shipped_suite_loads)
     }
     assert_true(closed_forms > 0 && must_differ > 0);
     assert_null(suite_find(&s, "41_corne"));
-    suite_free(&s);
 }
 
 TEST(fields_are_those_of_the_file)
 {
-    struct suite s;
+    OWN(suite) s;
     load_shipped(&s);
     const struct suite_scene *c = suite_find(&s, "41_cornell");
     assert_non_null(c);
@@ -93,7 +93,6 @@ TEST(fields_are_those_of_the_file)
     assert_int_equal(d->num_references, c->num_references);
     assert_memory_equal(d->reference, c->reference, sizeof c->reference);
     assert_string_not_equal(d->sha256, c->sha256);
-    suite_free(&s);
 }
 
 /* What a scene shows is in its hash: every image that one loads is among what its .json says that it uses, and vice versa. */
@@ -214,7 +213,7 @@ TEST(scenes_that_differ_differ_as_stated)
     assert_int_equal(differing_lines("46_sky", "96_sky_turned", no_line_differs), 0);
 
     /* The skies: tests/reference/suite/test_suite_scenes.c. */
-    struct suite s;
+    OWN(suite) s;
     load_shipped(&s);
     for (int i = 0; i < s.num_scenes; i++) {
         const struct suite_scene *scene = &s.scene[i], *base = suite_find(&s, scene->references_of);
@@ -225,7 +224,6 @@ TEST(scenes_that_differ_differ_as_stated)
         assert_int_equal(strcmp(scene->environment, base->environment) != 0,
                          strcmp(scene->name, "96_sky_turned") == 0);
     }
-    suite_free(&s);
 }
 
 /* Test vectors of FIPS 180-2, appendix B.1 and B.3, and of the empty message. */
@@ -395,9 +393,8 @@ static void expect_faults(const char *dir, const char *name, const char *text,
     struct suite s;
     struct err e;
     for (size_t i = 0; i < num; i++) {
-        char *wrong = edited(text, f[i].from, f[i].to);
+        OWN_TEXT wrong = edited(text, f[i].from, f[i].to);
         put(dir, name, wrong);
-        free(wrong);
         REFUSES(suite_load(test_path(dir), &s, &e), f[i].message);
         assert_ptr_equal(strstr(e.msg, test_path(dir)), e.msg);
     }
@@ -407,7 +404,7 @@ static void expect_faults(const char *dir, const char *name, const char *text,
 TEST(faults_are_named)
 {
     const char *dir = make_dir("faults");
-    struct suite s;
+    OWN(suite) s;
     struct err e;
     put(dir, "42_good.dae", "geometry");
     put(dir, "93_good.dae", "geometry");
@@ -418,7 +415,6 @@ TEST(faults_are_named)
     MUST(suite_load(test_path(dir), &s, &e));
     assert_int_equal(s.num_scenes, 2);
     assert_int_equal(s.scene[1].num_references, 3);
-    suite_free(&s);
     expect_faults(dir, "42_good.json", good, faults, COUNT(faults));
     expect_faults(dir, "93_good.json", good_9x, faults_of_9x, COUNT(faults_of_9x));
 }
@@ -464,7 +460,7 @@ TEST(environment_and_lens_are_opened)
         edited(good, "+", "'environment': 'sky.exr', 'lens_radius': 0.25, 'focal_distance': 2.5");
     put(dir, "42_good.json", text);
     free(text);
-    struct scene scene;
+    OWN(scene) scene;
     struct camera camera;
     MUST(suite_load(test_path(dir), &s, &e) && suite_open(&s.scene[0], &scene, &camera, &e));
     assert_true(camera.lens_radius == 0.25f && camera.focal_distance == 2.5f);
@@ -472,7 +468,6 @@ TEST(environment_and_lens_are_opened)
     rgb up = environment_radiance(scene.environment, (vec3){0, 1, 0});
     assert_true(up.r == 1 && up.g == 2 && up.b == 3);
     assert_string_not_equal(s.scene[0].sha256, plain);
-    scene_free(&scene);
     suite_free(&s);
 }
 

@@ -1,4 +1,5 @@
 /* suite.json: what is read, what is taken from the suite where a scene does not say it, and a line with file and place for each mistake. */
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #include "reference/suite/suite_own.h"
@@ -31,7 +32,7 @@ static void put_files(const char *suite)
 
 TEST(a_suite_of_ones_own_is_read)
 {
-    struct suite s;
+    OWN(suite) s;
     struct err e;
     put_files(good);
     MUST(suite_load(test_path("."), &s, &e));
@@ -61,13 +62,12 @@ TEST(a_suite_of_ones_own_is_read)
     assert_int_equal(dark->expect, VERDICT_DIFFERENT);
     assert_string_equal(dark->references_of, "ball");
     assert_int_equal(dark->num_references, 2);
-    suite_free(&s);
 }
 
 /* A reference is stale when any file of its scene has changed, and no other. */
 TEST(files_that_a_scene_uses_are_in_its_hash)
 {
-    struct suite s, t;
+    OWN(suite) s, t;
     struct err e;
     put_files(good);
     MUST(suite_load(test_path("."), &s, &e));
@@ -75,8 +75,6 @@ TEST(files_that_a_scene_uses_are_in_its_hash)
     MUST(suite_load(test_path("."), &t, &e));
     assert_string_not_equal(s.scene[2].sha256, t.scene[2].sha256);
     assert_string_equal(s.scene[0].sha256, t.scene[0].sha256);
-    suite_free(&s);
-    suite_free(&t);
 }
 
 /* `from` becomes `to`; a part of the line that must come out, file name first. */

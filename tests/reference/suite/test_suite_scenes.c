@@ -7,6 +7,7 @@
 #include "tests/support/render_check.h"
 #include "tests/support/suite_files.h"
 #include "renderer/image/image_oiio.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 #include "tests/support/vectors.h"
 
@@ -182,18 +183,16 @@ TEST(mesh_lamp_direct_light_is_the_closed_form)
     static double expected[2][3 * SIZE * SIZE];
     mesh_lamp_image(SIZE, 8, -1, expected[0]);
     mesh_lamp_image(SIZE, 8, 7, expected[1]);
-    struct scene s = open_shipped("36_mesh_lamp");
+    OWN(scene) s = open_shipped("36_mesh_lamp");
     struct integrator_options io = check_options(DIRECT_MIS, 1, 20261136);
     io.first_bounce = 1;
-    struct moments m = check_render(&s, io, SIZE, SIZE, 256);
+    OWN(moments) m = check_render(&s, io, SIZE, SIZE, 256);
     for (int side = SIZE; side >= TILE; side /= 4) {
         double z = worst_z(&m, expected[0], side, 0);
         if (z > CHECK_Z_LIMIT)
             fail_msg("a square of %d pixels: z %.2f", side, z);
         assert_true(worst_z(&m, expected[1], side, 0) > CHECK_Z_LIMIT);
     }
-    moments_free(&m);
-    scene_free(&s);
 }
 
 /* 27_smooth_normals at depth 1: albedo / pi x irradiance x cosine of the interpolated normal. The sun
@@ -268,7 +267,7 @@ TEST(smooth_normals_in_sunlight_are_the_closed_form)
     enum { SIZE = 16, TILE = 8 };
     const double slack = 5e-4;
     static double coarse[3 * SIZE * SIZE], fine[3 * SIZE * SIZE], flat[3 * SIZE * SIZE];
-    struct scene s = open_shipped("27_smooth_normals");
+    OWN(scene) s = open_shipped("27_smooth_normals");
     smooth_image(&s, SIZE, 144, 89, false, coarse);
     smooth_image(&s, SIZE, 377, 233, false, fine);
     smooth_image(&s, SIZE, 34, 21, true, flat);
@@ -282,13 +281,11 @@ TEST(smooth_normals_in_sunlight_are_the_closed_form)
                 }
                 assert_true(fabs(sum) / (TILE * TILE) < slack / 2);
             }
-    struct moments m = check_render(&s, check_options(DIRECT_MIS, 1, 20261127), SIZE, SIZE, 1024);
+    OWN(moments) m = check_render(&s, check_options(DIRECT_MIS, 1, 20261127), SIZE, SIZE, 1024);
     double z = worst_z(&m, fine, TILE, slack);
     if (z > CHECK_Z_LIMIT)
         fail_msg("z %.2f", z);
     assert_true(worst_z(&m, flat, TILE, slack) > CHECK_Z_LIMIT);
-    moments_free(&m);
-    scene_free(&s);
 }
 
 static vec3 reflected(vec3 p)
@@ -353,9 +350,9 @@ static double worst_difference(const struct moments *a, const struct moments *b,
 TEST(mirror_wall_is_a_second_room)
 {
     enum { SIZE = 32, TILE = 8, SPP = 1024, DEPTH = 30 };
-    struct scene s = open_shipped("21_mirror");
+    OWN(scene) s = open_shipped("21_mirror");
     set_wall(&s, 1);
-    struct scene two = unfolded(&s);
+    OWN(scene) two = unfolded(&s);
     struct moments expected =
         check_render(&two, check_options(DIRECT_MIS, DEPTH, 20261121), SIZE, SIZE, SPP);
     struct moments m =
@@ -371,8 +368,6 @@ TEST(mirror_wall_is_a_second_room)
     assert_true(worst_difference(&m, &expected, SIZE) > CHECK_Z_LIMIT);
     moments_free(&m);
     moments_free(&expected);
-    scene_free(&two);
-    scene_free(&s);
 }
 
 /* Only the k-th of the scene's lamps shines; the others are there and black. */
@@ -406,11 +401,11 @@ static void only_lamp(struct scene *s, uint32_t k)
 TEST(many_lamps_are_the_sum_of_single_ones)
 {
     enum { SIZE = 16, SPP = 8192, EACH = 256 };
-    struct scene all = open_shipped("45_many_lights");
+    OWN(scene) all = open_shipped("45_many_lights");
     assert_int_equal(all.num_lights, 48);
     struct integrator_options io = check_options(DIRECT_MIS, 3, 20261145);
     io.first_bounce = 1;
-    struct moments whole = check_render(&all, io, SIZE, SIZE, SPP);
+    OWN(moments) whole = check_render(&all, io, SIZE, SIZE, SPP);
     double sum[3] = {0}, var[3] = {0}, weakest[3] = {INFINITY, INFINITY, INFINITY};
     double mean[3] = {0}, mean_var[3] = {0};
     for (size_t p = 0; p < SIZE * SIZE; p++)
@@ -419,11 +414,11 @@ TEST(many_lamps_are_the_sum_of_single_ones)
             mean_var[c] += moments_var_of_mean(&whole, p, c) / pow(SIZE * SIZE, 2);
         }
     for (uint32_t k = 0; k < all.num_lights; k++) {
-        struct scene s = open_shipped("45_many_lights");
+        OWN(scene) s = open_shipped("45_many_lights");
         only_lamp(&s, k);
         assert_int_equal(s.num_lights, 1);
         io.sampler.seed = 20261200 + k;
-        struct moments m = check_render(&s, io, SIZE, SIZE, EACH);
+        OWN(moments) m = check_render(&s, io, SIZE, SIZE, EACH);
         double one[3] = {0};
         for (size_t p = 0; p < SIZE * SIZE; p++)
             for (int c = 0; c < 3; c++) {
@@ -434,8 +429,6 @@ TEST(many_lamps_are_the_sum_of_single_ones)
             sum[c] += one[c];
             weakest[c] = fmin(weakest[c], one[c]);
         }
-        moments_free(&m);
-        scene_free(&s);
     }
     for (int c = 0; c < 3; c++) {
         double se = sqrt(var[c] + mean_var[c]);
@@ -444,8 +437,6 @@ TEST(many_lamps_are_the_sum_of_single_ones)
                      se);
         assert_true(fabs(mean[c] - (sum[c] - weakest[c])) > CHECK_Z_LIMIT * se);
     }
-    moments_free(&whole);
-    scene_free(&all);
 }
 
 /* The mesh is what its formula says, and large enough. */
@@ -457,14 +448,12 @@ TEST(mesh_is_the_generated_one)
     assert_non_null(f);
     suite_write_mesh(f);
     assert_int_equal(fclose(f), 0);
-    char *shipped = test_read("reference/scenes/44_mesh.dae");
+    OWN_TEXT shipped = test_read("reference/scenes/44_mesh.dae");
     assert_string_equal(text, shipped);
-    free(shipped);
     free(text);
-    struct scene s = open_shipped("44_mesh");
+    OWN(scene) s = open_shipped("44_mesh");
     assert_true(s.num_triangles >= 28000);
     assert_int_equal(s.num_degenerate, 0);
-    scene_free(&s);
 }
 
 /* The knot's normal, by its definition at right angles to two chords of the skin, points away from the
@@ -511,9 +500,9 @@ static struct image read_sky(const char *path)
  * beyond the outermost rows; no texel is bright enough to be one that sampling misses. */
 TEST(skies_are_the_generated_ones)
 {
-    struct image sky = read_sky("reference/scenes/46_sky.exr");
-    struct image turned = read_sky("reference/scenes/96_sky_turned.exr");
-    struct image made;
+    OWN(image) sky = read_sky("reference/scenes/46_sky.exr");
+    OWN(image) turned = read_sky("reference/scenes/96_sky_turned.exr");
+    OWN(image) made;
     struct err e = {""};
     assert_true(suite_sky(0, &made, &e));
     size_t floats = (size_t)3 * SKY_WIDTH * SKY_HEIGHT;
@@ -532,7 +521,4 @@ TEST(skies_are_the_generated_ones)
                 most = fmax(most, share);
             }
     assert_true(most < 1e-3 * total);
-    image_free(&made);
-    image_free(&turned);
-    image_free(&sky);
 }

@@ -4,6 +4,7 @@
 #include "reference/truth/truth.h"
 #include "reference/truth/truth_one_lamp.h"
 #include "tests/support/quadrature.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #include <gsl/gsl_errno.h>
@@ -186,7 +187,7 @@ TEST(images_are_exact_moments)
 {
     static const char *const names[] = {"11_furnace", "12_point_plane", "13_square_patch"};
     for (size_t s = 0; s < COUNT(names); s++) {
-        struct moments m;
+        OWN(moments) m;
         render_truth(names[s], 64, 48, &m);
         assert_int_equal(m.width, 64);
         assert_int_equal(m.height, 48);
@@ -197,7 +198,6 @@ TEST(images_are_exact_moments)
             for (size_t c = 3 * i; c < 3 * i + 3; c++)
                 assert_true(m.mean[c] > 0 && m.m2[c] == 0 && m.m3[c] == 0);
         }
-        moments_free(&m);
     }
 }
 
@@ -206,11 +206,10 @@ TEST(images_are_exact_moments)
 TEST(furnace_image_is_flat)
 {
     static const double expected[3] = {1.84464, 1.96875, 2.49984};
-    struct moments m;
+    OWN(moments) m;
     render_truth("11_furnace", 64, 64, &m);
     for (size_t i = 0; i < 3 * 64 * 64; i++)
         assert_true(same(m.mean[i], expected[i % 3]));
-    moments_free(&m);
 }
 
 static double point_12(double x, double z, const void *ctx)
@@ -288,7 +287,7 @@ TEST(pixels_do_not_depend_on_resolution)
 TEST(images_are_the_right_way_round)
 {
     for (size_t s = 0; s < COUNT(plane_scenes); s++) {
-        struct moments m;
+        OWN(moments) m;
         render_truth(plane_scenes[s].name, 64, 64, &m);
         int best = 0;
         for (int i = 0; i < 64 * 64; i++)
@@ -304,7 +303,6 @@ TEST(images_are_the_right_way_round)
             double other = mean_at(&m, symmetry & 1 ? 63 - x : x, symmetry & 2 ? 63 - y : y, 0);
             assert_true(other < 0.5 * m.mean[3 * best]);
         }
-        moments_free(&m);
     }
 }
 

@@ -4,6 +4,7 @@
 #include "reference/truth/truth_spot.h"
 #include "reference/truth/truth_sun.h"
 #include "tests/support/quadrature.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 #include "tests/support/vectors.h"
 
@@ -99,11 +100,10 @@ TEST(furnace_images_are_flat)
          {0.1 * (1 - gsl_pow_int(0.95, 21)) / 0.05, 0.15 * (1 - gsl_pow_int(0.9, 21)) / 0.1,
           0.3 * (1 - gsl_pow_int(0.8, 21)) / 0.2}}};
     for (size_t f = 0; f < COUNT(furnace); f++) {
-        struct moments m;
+        OWN(moments) m;
         render_truth(furnace[f].name, 16, 16, &m);
         for (size_t i = 0; i < 3 * 16 * 16; i++)
             assert_true(same(m.mean[i], furnace[f].expected[i % 3]));
-        moments_free(&m);
     }
 }
 
@@ -515,7 +515,7 @@ TEST(pyramid_pixels_match_rays)
 {
     double cosine[4];
     truth_pyramid_cosines(&pyramid, cosine);
-    struct moments m;
+    OWN(moments) m;
     render_truth("32_sun_plane", 64, 64, &m);
     int mixed = 0;
     for (int row = 0; row < 64; row++)
@@ -536,7 +536,6 @@ TEST(pyramid_pixels_match_rays)
             assert_true(same(mean_at(&m, col, row, 2), 0.3 * 2 / M_PI * sum));
         }
     assert_int_equal(mixed, 127);
-    moments_free(&m);
 }
 
 #define FOOT   "'footprint':{'x':[-1,1],'z':[-1,1]}"

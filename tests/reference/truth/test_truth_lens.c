@@ -2,6 +2,7 @@
  * lenses with a known mistake must be rejected. */
 #include "reference/truth/truth_lens.h"
 #include "tests/support/quadrature.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #include <gsl/gsl_integration.h>
@@ -142,7 +143,7 @@ TEST(pixels_match_rays)
         int col, row, panel;
     } pixels[] = {{40, 20, 0}, {60, 45, 0}, {5, 5, 0},  {20, 17, 0},
                   {8, 40, 1},  {30, 55, 1}, {14, 32, 1}};
-    struct moments m;
+    OWN(moments) m;
     render_truth("17_lens_step", 64, 64, &m);
     int blurred = 0;
     for (size_t i = 0; i < COUNT(pixels); i++) {
@@ -163,20 +164,18 @@ TEST(pixels_match_rays)
         }
     }
     assert_true(blurred == 6);
-    moments_free(&m);
 }
 
 /* Away from both edges the image is one panel or the background; up is +Y and right is +X. */
 TEST(panels_are_where_they_belong)
 {
-    struct moments m;
+    OWN(moments) m;
     render_truth("17_lens_step", 64, 64, &m);
     for (int c = 0; c < 3; c++) {
         assert_true(mean_at(&m, 63, 0, c) == panels[0].radiance[c]);
         assert_true(same(mean_at(&m, 0, 63, c), panels[1].radiance[c]));
         assert_true(mean_at(&m, 63, 63, c) == background[c]);
     }
-    moments_free(&m);
 }
 
 #define PANEL(distance, normal, offset)                                                            \

@@ -6,6 +6,7 @@
 #include "tests/support/optics.h"
 #include "tests/support/quadrature.h"
 #include "tests/support/suite_files.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 #include "tests/support/vectors.h"
 
@@ -167,7 +168,7 @@ TEST(mirror_box_pixels)
      * with an edge across, corners, fine structure of later arrivals. */
     enum { SIZE = 60 };
     static const int at[][2] = {{3, 8}, {11, 20}, {33, 3}, {11, 33}, {38, 36}, {52, 43}, {33, 56}};
-    struct moments m;
+    OWN(moments) m;
     render("18_mirror_box", 0, SIZE, &m);
     int cut = 0;
     for (size_t i = 0; i < COUNT(at); i++)
@@ -181,7 +182,6 @@ TEST(mirror_box_pixels)
         }
     /* The middle of a pixel is no substitute for its mean. */
     assert_true(cut >= 6);
-    moments_free(&m);
 }
 
 TEST(fresnel_of_amplitudes)
@@ -341,13 +341,12 @@ static void slab_scene(const void *scene, double sx, double sy, double light[3])
 TEST(slab_pixels)
 {
     static const int at[][2] = {{0, 0}, {63, 63}, {5, 31}, {40, 12}, {63, 32}};
-    struct moments m;
+    OWN(moments) m;
     render("19_glass_slab", 0, 0, &m);
     for (size_t i = 0; i < COUNT(at); i++)
         for (int c = 0; c < 3; c++)
             assert_true(same(m.mean[3 * (64 * at[i][1] + at[i][0]) + c],
                              pixel_mean(slab_scene, NULL, 0.9, 64, at[i][0], at[i][1], c, 1e-11)));
-    moments_free(&m);
 }
 
 /* 22_glass_sphere. */
@@ -437,14 +436,13 @@ TEST(ball_pixels)
 {
     /* Of an image of 16 x 16: a wall, the middle of the ball, its rim, edges of walls through it. */
     static const int at[][2] = {{1, 8}, {9, 9}, {3, 9}, {4, 13}, {9, 14}, {13, 6}};
-    struct moments m;
+    OWN(moments) m;
     render("22_glass_sphere", 0, 16, &m);
     for (size_t i = 0; i < COUNT(at); i++) {
         double mean = m.mean[3 * (16 * at[i][1] + at[i][0]) + (int)i % 3];
         double direct = pixel_mean(ball_scene, NULL, 0.4, 16, at[i][0], at[i][1], (int)i % 3, 1e-7);
         assert_true(fabs(mean - direct) <= 1e-6 * direct);
     }
-    moments_free(&m);
 }
 
 /* The largest difference, relative to the larger of the two, of a square, a sixteenth of the image's side (4 pixels of 64), in

@@ -8,6 +8,7 @@
 #include "renderer/image/image_oiio.h"
 #include "tests/support/quadrature.h"
 #include "tests/support/suite_files.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 #include "tests/support/vectors.h"
 
@@ -213,7 +214,7 @@ static void read_map(struct image *im)
 
 TEST(map_is_what_make_sky_writes)
 {
-    struct image im;
+    OWN(image) im;
     read_map(&im);
     for (int row = 0; row < MAP_HEIGHT; row++)
         for (int col = 0; col < MAP_WIDTH; col++)
@@ -224,7 +225,6 @@ TEST(map_is_what_make_sky_writes)
                 /* mathematical functions may differ in the last digit between libraries */
                 assert_true(fabsf(v - expected) <= 2e-7f * expected && v > 0);
             }
-    image_free(&im);
 }
 
 /* What a surface of albedo 1 reflects under the map itself, bilinear between the middles of texels and
@@ -269,7 +269,7 @@ static double reflected_under_map(const struct image *im, int channel, const dou
 /* So the form may be used for the map: what the texels' steepness is there for. */
 TEST(map_stands_for_the_gradient)
 {
-    struct image im, plain;
+    OWN(image) im, plain;
     double worst = 0, worst_plain = 0;
     uint64_t s = 350;
     read_map(&im);
@@ -296,8 +296,6 @@ TEST(map_stands_for_the_gradient)
     print_message("worst error %.2e, of texels with the plain values %.2e\n", worst, worst_plain);
     assert_true(worst < 1e-5);
     assert_true(worst_plain > 1e-4);
-    image_free(&im);
-    image_free(&plain);
 }
 
 /* Of the shipped images: one pixel's mean by the midpoints of 40 x 40 cells of it, exact to 1e-6, with
@@ -354,7 +352,7 @@ TEST(pixels_lie_where_they_should)
                   {"35_sky_gradient", gradient_seen, CELLS}};
     static const int at[][2] = {{0, 0}, {51, 10}, {52, 10}, {10, 50}, {63, 63}, {2, 30}};
     for (size_t s = 0; s < COUNT(scenes); s++) {
-        struct moments m;
+        OWN(moments) m;
         render(scenes[s].name, &m);
         int cells = scenes[s].cells;
         for (size_t i = 0; i < COUNT(at); i++) {
@@ -364,6 +362,5 @@ TEST(pixels_lie_where_they_should)
                                       (at[i][1] + (k / cells + 0.5) / cells) / 32 - 1, (int)i % 3);
             assert_true(fabs(mean - sum / (cells * cells)) < (cells == CELLS ? 2e-6 : 1e-4) * mean);
         }
-        moments_free(&m);
     }
 }

@@ -4,6 +4,7 @@
 #include "reference/truth/truth_snell_window.h"
 #include "tests/support/optics.h"
 #include "tests/support/quadrature.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 /* What is left of the sky's radiance in glass: the power of a thin bundle of rays is that outside times
@@ -44,7 +45,7 @@ TEST(window_pixels_lie_where_they_should)
     enum { CELLS = 40 };
     static const double sky_radiance[3] = {.4, .3, .2}, floor_radiance[3] = {.3, .5, .8};
     static const int at[][2] = {{0, 0}, {32, 32}, {40, 20}, {63, 10}, {10, 60}, {56, 32}};
-    struct moments m;
+    OWN(moments) m;
     render_truth("16_snell_window", 64, 64, &m);
     for (size_t i = 0; i < COUNT(at); i++)
         for (int c = 0; c < 3; c++) {
@@ -59,7 +60,6 @@ TEST(window_pixels_lie_where_they_should)
             bool edge = at[i][0] == 56;
             assert_true(fabs(mean - sum / (CELLS * CELLS)) < (edge ? 5e-3 : 1e-5) * mean);
         }
-    moments_free(&m);
 }
 
 struct metal {
@@ -144,7 +144,7 @@ TEST(three_lamps_both_ways)
     static const double node[3] = {-0.7745966692414834, 0, 0.7745966692414834};
     static const double weight[3] = {5. / 18, 8. / 18, 5. / 18};
     static const int at[][2] = {{0, 0}, {95, 0}, {20, 40}, {60, 45}, {95, 63}};
-    struct moments m;
+    OWN(moments) m;
     render_truth("39_three_lamps", 96, 64, &m);
     for (size_t i = 0; i < COUNT(at); i++) {
         int c = (int)i % 3;
@@ -162,7 +162,6 @@ TEST(three_lamps_both_ways)
         assert_false(same(mean, lacking));
         assert_false(same(mean, exchanged));
     }
-    moments_free(&m);
 }
 
 TEST(impossible_values_are_refused)

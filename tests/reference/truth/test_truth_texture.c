@@ -2,6 +2,7 @@
 #include "reference/truth/truth.h"
 #include "tests/support/quadrature.h"
 #include "tests/support/suite_files.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 /* By the trapezoid rule on the kernel itself. */
@@ -79,7 +80,7 @@ TEST(pixels_are_means_of_the_texture)
 {
     enum { CELLS = 40 };
     static const char wraps[4] = {'W', 'M', 'C', 'B'};
-    struct moments m;
+    OWN(moments) m;
     double off = 0;
     read_picture(suite_shipped_scene("29_textures"));
     render_truth("29_textures", 64, 64, &m);
@@ -101,7 +102,6 @@ TEST(pixels_are_means_of_the_texture)
         off = fmax(off, fabs(other - sum[0]));
     }
     assert_true(off > 0.2); /* u's wrap for v's is seen */
-    moments_free(&m);
 }
 
 /* What the .json may not say. */

@@ -1,6 +1,7 @@
 /* Words to a command line and back: by a shell, and by our own reader. */
 #include "renderer/base/shell_quote.h"
 #include "tools/results/claim_result.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 static const char *const words[] = {
@@ -41,10 +42,9 @@ TEST(no_word_is_lost_however_many)
     static const char *many[MANY + 1];
     for (int i = 0; i < MANY; i++)
         many[i] = i % 2 == 0 ? "''''''''''''''''''''''''''''''''" : "b";
-    char *text = shell_quote_join(NULL, many);
+    OWN_TEXT text = shell_quote_join(NULL, many);
     assert_int_equal(strlen(text), MANY / 2 * (2 + 4 * 32 + 1) + MANY - 1);
     expect_words(text, many);
-    free(text);
 }
 
 /* What results.json says of its origin, too. */

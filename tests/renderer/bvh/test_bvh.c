@@ -7,6 +7,7 @@
 #include "renderer/math/warp.h"
 #include "tests/support/build_scene.h"
 #include "tests/support/mesh.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 enum { KINDS = BVH_WIDE + 1 };
@@ -62,7 +63,7 @@ TEST(hierarchies_equal_brute_force)
 {
     struct err e = {0};
     for (enum layout layout = SCATTERED; layout < NUM_LAYOUTS; layout++) {
-        struct scene s = make_scene(layout);
+        OWN(scene) s = make_scene(layout);
         struct bvh *tree[KINDS];
         for (int k = 0; k < KINDS; k++) {
             tree[k] = bvh_build(&s, (enum bvh_kind)k, &e);
@@ -105,7 +106,6 @@ TEST(hierarchies_equal_brute_force)
             assert_true(stats[k].rays == 2 * rays);
             bvh_free(tree[k]);
         }
-        scene_free(&s);
     }
 }
 
@@ -168,7 +168,7 @@ TEST(sphere_closed_form)
  * large coordinates and of a sphere, in grazing directions too. */
 TEST(no_self_intersection)
 {
-    struct scene s = build_scene();
+    OWN(scene) s = build_scene();
     uint32_t m = build_material(&s, grey(0.5f), grey(0));
     build_triangle(&s, v3(100, 3, -50), v3(103, 7, -48), v3(99, 8, -53), m);
     build_sphere(&s, v3(5, 6, 7), 0.3f, 1, m);
@@ -200,7 +200,6 @@ TEST(no_self_intersection)
         assert_true(h.prim[0] != prim);
     }
     bvh_free(bvh);
-    scene_free(&s);
 }
 
 /* One to twenty rays, of a list and of a tree: lanes behind the last of the list are none. */
@@ -208,7 +207,7 @@ TEST(few_rays)
 {
     struct err e = {0};
     for (enum layout layout = SCATTERED; layout <= ONE; layout += ONE - SCATTERED) {
-        struct scene s = make_scene(layout);
+        OWN(scene) s = make_scene(layout);
         struct bvh *all = bvh_build(&s, BVH_BRUTE_FORCE, &e), *wide = bvh_build(&s, BVH_WIDE, &e);
         MUST(all != NULL && wide != NULL);
         for (int n = 1; n <= 20; n++) {
@@ -239,7 +238,6 @@ TEST(few_rays)
         }
         bvh_free(all);
         bvh_free(wide);
-        scene_free(&s);
     }
 }
 
@@ -251,7 +249,7 @@ TEST(a_cube_of_any_size)
     struct err e = {0};
     for (size_t k = 0; k < sizeof half / sizeof *half; k++) {
         const float a = half[k];
-        struct scene s = build_scene();
+        OWN(scene) s = build_scene();
         uint32_t m = build_material(&s, grey(0.5f), grey(0));
         build_box(&s, v3(-a, -a, -a), v3(2 * a, 2 * a, 2 * a), m);
         MUST(scene_finish(&s, "test", &e));
@@ -283,7 +281,6 @@ TEST(a_cube_of_any_size)
             }
         }
         bvh_free(bvh);
-        scene_free(&s);
     }
 }
 
@@ -292,7 +289,7 @@ TEST(a_cube_of_any_size)
 TEST(corners_edges_and_faces)
 {
     struct err e = {0};
-    struct scene s = build_scene();
+    OWN(scene) s = build_scene();
     uint32_t m = build_material(&s, grey(0.5f), grey(0));
     build_box(&s, v3(0, 0, 0), v3(1, 1, 1), m);
     build_triangle(&s, v3(3, 0, 0), v3(-7, 0, 0), v3(3, 1, 0), m);
@@ -344,5 +341,4 @@ TEST(corners_edges_and_faces)
     }
     for (int i = 0; i < 13; i++)
         assert_int_equal(seen[i], 1);
-    scene_free(&s);
 }

@@ -8,6 +8,7 @@
 #include "renderer/math/warp.h"
 #include "tests/support/build_scene.h"
 #include "tests/support/mesh.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #include <float.h>
@@ -281,7 +282,7 @@ TEST(walls_beside_a_tree)
 TEST(ignored_sphere)
 {
     for (uint32_t others = 0; others < 80; others += 40) {
-        struct scene s = build_scene();
+        OWN(scene) s = build_scene();
         uint32_t m = build_material(&s, grey(0.5f), grey(0));
         build_triangle(&s, v3(9, 9, 9), v3(9, 8, 9), v3(8, 9, 9), m);
         for (uint32_t i = 0; i < others; i++)
@@ -310,21 +311,19 @@ TEST(ignored_sphere)
             }
             bvh_free(wide[j]);
         }
-        scene_free(&s);
     }
 }
 
 /* At 10^5 triangles no more than 60 bytes each. */
 TEST(small_enough)
 {
-    struct scene s = mesh_ball(224, 224, 0.5f);
+    OWN(scene) s = mesh_ball(224, 224, 0.5f);
     struct err e = {0};
     struct bvh *b = bvh_build(&s, BVH_WIDE, &e);
     assert_non_null(b);
     assert_true(bvh_size(b) <= 60 * (size_t)s.num_triangles);
     assert_true(bvh_size(b) >= 36 * (size_t)s.num_triangles); /* the corners alone */
     bvh_free(b);
-    scene_free(&s);
 }
 
 /* The same nodes and leaves, bit for bit, however many threads build them; also where half of the triangles

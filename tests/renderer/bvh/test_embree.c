@@ -19,6 +19,7 @@
 #include "renderer/math/warp.h"
 #include "tests/studies/bench/embree_mesh.h"
 #include "tests/support/mesh.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #include <float.h>
@@ -379,7 +380,7 @@ static bool moller_trumbore(const vec3 p[3], const ray *r)
 TEST(nothing_leaks)
 {
     enum { LEAK_RAYS = 100000, CONTROL_RAYS = 100 };
-    struct scene s = mesh_ball(224, 224, 0);
+    OWN(scene) s = mesh_ball(224, 224, 0);
     struct err e = {0};
     uint32_t escapes[BVH_WIDE + 1] = {0}, unseen = 0, control = 0;
     struct bounds b = bounds_of(&s);
@@ -417,5 +418,4 @@ TEST(nothing_leaks)
     assert_true(escapes[BVH_CENTROID] == 0 && escapes[BVH_SAH] == 0 && escapes[BVH_WIDE] == 0 &&
                 unseen == 0);
     assert_true(control > 0);
-    scene_free(&s);
 }

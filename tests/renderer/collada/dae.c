@@ -1,4 +1,5 @@
 #include "dae.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #include <ctype.h>
@@ -78,9 +79,8 @@ char *dae_text(const struct dae *d)
 
 bool dae_load(const struct dae *d, enum dialect dialect, struct scene *s, struct err *e)
 {
-    char *text = dae_text(d);
+    OWN_TEXT text = dae_text(d);
     bool ok = collada_parse(text, strlen(text), "test.dae", dialect, s, e);
-    free(text);
     return ok;
 }
 

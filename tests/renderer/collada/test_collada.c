@@ -11,6 +11,7 @@
 #define _GNU_SOURCE
 #include "renderer/scene/environment.h"
 #include "dae.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #include <ctype.h>
@@ -218,10 +219,9 @@ static void __attribute__((noinline)) expect(const char *scene, const char *line
     if (at == NULL)
         fail_msg("no '%s' in %s", key, scene);
     at += strlen(lines);
-    char *got = strndup(at, strcspn(at, "\n"));
+    OWN_TEXT got = strndup(at, strcspn(at, "\n"));
     if (line[n] == '*' ? strstr(got, values + 1) == NULL : !same(got, values, tolerance))
         fail_msg("%s is %s, expected %s", key, got, values);
-    free(got);
 }
 
 struct test_case {
@@ -255,10 +255,9 @@ static void run(const struct test_case *c)
     MUST(dae_load(&c->d, c->dialect, &s, &e));
     check_lights(&s);
     assert_null(strchr(s.note, '\n'));
-    char *text = dump(&s);
+    OWN_TEXT text = dump(&s);
     for (int i = 0; i < c->num_expected; i++)
         expect(text, c->expected[i]);
-    free(text);
     scene_free(&s);
 }
 
@@ -396,19 +395,18 @@ static void repeat(char *out, const char *s, int times)
 TEST(deep_nesting_is_an_error)
 {
     enum { DEEP = 30000 };
-    char *nodes = calloc(16 * DEEP + 1, 1);
+    OWN_TEXT nodes = calloc(16 * DEEP + 1, 1);
     assert_non_null(nodes);
     repeat(nodes, "<node>", DEEP);
     repeat(nodes + strlen(nodes), "</node>", DEEP);
     dae_must_fail((struct dae){.nodes = nodes}, DIALECT_AUTO, "nested deeper");
-    free(nodes);
 }
 
 /* The parser counts lines up to 65535 only; the document's own 5th line is where `nodes` starts. */
 TEST(lines_are_right_far_down)
 {
     enum { LINES = 100000 };
-    char *nodes = calloc(LINES + 200, 1);
+    OWN_TEXT nodes = calloc(LINES + 200, 1);
     assert_non_null(nodes);
     repeat(nodes, "\n", LINES);
     strcat(nodes, "<node><translate>1\n2\nthree</translate></node>");
@@ -422,7 +420,6 @@ TEST(lines_are_right_far_down)
     snprintf(expected, sizeof expected, "test.dae:%ld: <translate>: 'three'", line);
     free(text);
     dae_must_fail(d, DIALECT_AUTO, expected);
-    free(nodes);
 }
 
 /* The nodes are in line 7, so the comment ends in line 8 and the word is in line 9. */

@@ -4,6 +4,7 @@
  * not by the loader. */
 #define _GNU_SOURCE
 #include "renderer/collada/collada.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #include <glob.h>
@@ -60,12 +61,11 @@ TEST(each_fault_is_named_with_its_line)
 /* Negative control: without a fault the scene loads, so the faults are what is refused. */
 TEST(scene_without_fault_loads)
 {
-    struct scene s = {0};
+    OWN(scene) s = {0};
     struct err e = {""};
     MUST(collada_load("tests/bad/00_valid.dae", DIALECT_AUTO, &s, &e));
     assert_int_equal(s.num_triangles, 2);
     assert_int_equal(s.num_spheres, 1);
-    scene_free(&s);
 }
 
 TEST(unreadable_file_is_an_error)
@@ -167,7 +167,7 @@ TEST(file_without_scene)
         {VISUAL("a") VISUAL("b"), "no <scene>, and more than one <visual_scene>", false, false}};
     for (size_t i = 0; i < COUNT(of); i++) {
         char text[2048];
-        struct scene s = {0};
+        OWN(scene) s = {0};
         struct err e = {""};
         snprintf(
             text, sizeof text,
@@ -179,7 +179,6 @@ TEST(file_without_scene)
         assert_int_equal(ok, of[i].loads);
         assert_non_null(strstr(ok ? s.note : e.msg, of[i].says));
         assert_int_equal(s.camera.present, of[i].sees);
-        scene_free(&s);
     }
 #undef VISUAL
 }

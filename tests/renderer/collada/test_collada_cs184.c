@@ -2,6 +2,7 @@
  * those of the course's files as counted by hand and by the staff's renderer. */
 #include "renderer/collada/collada.h"
 #include "renderer/scene/environment.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 static const double DEGREE = 3.14159265358979323846 / 180;
@@ -35,7 +36,7 @@ static const struct material *material_of(const struct scene *s, const char *obj
  * diag(0.6, 0.8, 1) at z = 1.49 of a Z-up file: corners (+-0.3, 1.49, +-0.4), area 0.48, downwards. */
 TEST(spheres_lambertian)
 {
-    struct scene s = must_load("sky/CBspheres_lambertian.dae", DIALECT_AUTO);
+    OWN(scene) s = must_load("sky/CBspheres_lambertian.dae", DIALECT_AUTO);
     assert_int_equal(s.dialect, DIALECT_CGL);
     assert_int_equal(s.num_triangles, 12);
     assert_int_equal(s.num_spheres, 2);
@@ -62,30 +63,27 @@ TEST(spheres_lambertian)
     assert_true(fabs(s.camera.hfov - 49.13434 * DEGREE) < 1e-6);
     assert_true(fabs(s.camera.vfov - 37.849 * DEGREE) < 1e-4);
     assert_close(s.frame_max, 1, 1.5f, 1);
-    scene_free(&s);
 }
 
 /* 28588 triangles with the two of the lamp; the eye is on the other side. */
 TEST(bunny)
 {
-    struct scene s = must_load("sky/CBbunny.dae", DIALECT_AUTO);
+    OWN(scene) s = must_load("sky/CBbunny.dae", DIALECT_AUTO);
     assert_int_equal(s.num_triangles + s.num_degenerate, 28588);
     assert_int_equal(s.num_lights, 1);
     assert_close(s.camera.backward, 0, 0, -1);
-    scene_free(&s);
 }
 
 /* The light mesh is commented out and there is no area light: a point of 5 without falloff. */
 TEST(empty_box)
 {
-    struct scene s = must_load("sky/CBempty.dae", DIALECT_AUTO);
+    OWN(scene) s = must_load("sky/CBempty.dae", DIALECT_AUTO);
     assert_int_equal(s.num_triangles, 10);
     assert_int_equal(s.num_lights, 1);
     assert_int_equal(s.lights[0].kind, LIGHT_POINT);
     assert_true(s.lights[0].value.g == 5 && s.lights[0].attenuation[0] == 1 &&
                 s.lights[0].attenuation[2] == 0);
     assert_close(s.lights[0].position, 0, 1.49f, 0.00431585f);
-    scene_free(&s);
 }
 
 /* No CGL file, but of the Blender that wrote all of them; its phong has a highlight of exponent 256, so of alpha^2 = 2/(4 256 + 2)
@@ -120,7 +118,7 @@ static void assert_rgb(rgb c, float r, float g, float b)
 /* One mirror of 1, one glass of 1.45, both clear; the box as in CBspheres_lambertian. */
 TEST(mirror_and_glass)
 {
-    struct scene s = must_load("sky/CBspheres.dae", DIALECT_AUTO);
+    OWN(scene) s = must_load("sky/CBspheres.dae", DIALECT_AUTO);
     assert_int_equal(s.dialect, DIALECT_CGL);
     assert_int_equal(s.num_triangles, 12);
     assert_int_equal(s.num_spheres, 2);
@@ -140,7 +138,6 @@ TEST(mirror_and_glass)
     }
     assert_int_equal(mirrors, 1);
     assert_int_equal(glasses, 1);
-    scene_free(&s);
 }
 
 /* Three tinted glasses; 252 triangles. The camera's matrix has 15 numbers. */
@@ -171,11 +168,10 @@ TEST(gems)
 /* An ambient light, which the camera does not see, and a directional one. */
 TEST(banana)
 {
-    struct scene s = must_load("keenan/banana.dae", DIALECT_AUTO);
+    OWN(scene) s = must_load("keenan/banana.dae", DIALECT_AUTO);
     assert_int_equal(s.num_triangles + s.num_degenerate, 2458);
     assert_int_equal(s.num_lights, 2);
     assert_true(s.environment_light >= 0 && environment_is_hidden(s.environment));
     assert_int_equal(s.lights[1 - s.environment_light].kind, LIGHT_DIRECTIONAL);
     assert_true(environment_radiance(s.environment, v3(0, 1, 0)).g == 1);
-    scene_free(&s);
 }

@@ -2,6 +2,7 @@
  * must either load it or say one line; crashes, leaks and undefined behaviour are for the sanitizers
  * to see. */
 #include "renderer/collada/collada.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 enum { MOST = 1 << 16, RUNS = 12000 };
@@ -72,7 +73,7 @@ TEST(damaged_scenes_load_or_say_a_line)
         truncate_text, flip_bits, spoil_number, remove_run, spoil_lines};
     enum { KINDS = sizeof DAMAGES / sizeof *DAMAGES };
     static char text[MOST];
-    char *original = test_read("tests/bad/00_valid.dae");
+    OWN_TEXT original = test_read("tests/bad/00_valid.dae");
     const size_t size = strlen(original);
     assert_true(size > 1000 && size < MOST / 2);
     uint32_t seed = 20240229;
@@ -82,7 +83,7 @@ TEST(damaged_scenes_load_or_say_a_line)
         memcpy(text, original, size);
         size_t n = DAMAGES[kind](text, size, &seed);
         /* A block of its own, so that reading past the end is seen. */
-        char *exact = malloc(n + (n == 0));
+        OWN_TEXT exact = malloc(n + (n == 0));
         assert_non_null(exact);
         memcpy(exact, text, n);
         struct scene s = {0};
@@ -98,9 +99,7 @@ TEST(damaged_scenes_load_or_say_a_line)
                 strpbrk(e.msg, "\n\r\t") != NULL)
                 fail_msg("run %d: not a good line: '%s'", run, e.msg);
         }
-        free(exact);
     }
-    free(original);
     /* The damage must bite, and not always at the XML. */
     for (int kind = 0; kind < KINDS; kind++)
         assert_true(refused[kind] > 100);

@@ -2,6 +2,7 @@
 #include "renderer/base/fs.h"
 #include "renderer/collada/collada.h"
 #include "tests/support/build_scene.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 /* A quadrangle with corners (0,0), (1,0), (1,1), (0,1) and two sets of coordinates: of number 4 u = 1 - x, v = y, by vertex; of
@@ -72,7 +73,7 @@ static void assert_uv(const struct scene *s, float a, float b, float c)
 
 TEST(a_texture_of_a_diffuse_surface)
 {
-    struct scene s;
+    OWN(scene) s;
     struct err e = {""};
     MUST(load(PLAIN, &s, &e));
     assert_int_equal(s.num_images, 1);
@@ -90,7 +91,6 @@ TEST(a_texture_of_a_diffuse_surface)
     assert_near(c.g, 10 / 255. / 12.92, 1e-6);
     assert_near(c.b, 1, 1e-6);
     assert_uv(&s, 0, 2, 3);
-    scene_free(&s);
 }
 
 TEST(coordinates_by_binding)
@@ -118,7 +118,7 @@ TEST(coordinates_by_binding)
 
 TEST(images_are_read_once)
 {
-    struct scene s;
+    OWN(scene) s;
     struct err e = {""};
     struct pieces p = PLAIN;
     p.channels = DIFFUSE "<emission><texture texture='o' texcoord='UV'/></emission>";
@@ -132,7 +132,6 @@ TEST(images_are_read_once)
                      0);
     assert_int_equal(s.num_lights, 1);
     assert_true(s.lights[0].textured);
-    scene_free(&s);
 }
 
 /* Absolute names, file:// and COLLADA 1.5's <ref>; an escape that is none is a name. */
@@ -142,7 +141,7 @@ TEST(other_names)
                                         "<ref>%s/sub/a b.png</ref>", "%s/sub/50%%.png"};
     for (int k = 0; k < 4; k++) {
         char uri[200], image[300];
-        struct scene s;
+        OWN(scene) s;
         struct err e = {""};
         struct pieces p = PLAIN;
         snprintf(uri, sizeof uri, forms[k],
@@ -151,7 +150,6 @@ TEST(other_names)
         p.image = image;
         MUST(load(p, &s, &e));
         assert_int_equal(s.num_images, 1);
-        scene_free(&s);
     }
 }
 
@@ -213,14 +211,13 @@ static int setup(void **state)
 {
     (void)state;
     struct err e;
-    struct image bright = build_image(2, 2);
+    OWN(image) bright = build_image(2, 2);
     const uint8_t pixel[3 * 6] = {0, 0, 0, 1, 1, 1, 2, 2, 2, 102, 10, 255, 4, 4, 4, 5, 5, 5};
     bright.data[4] = 1.5f;
     MUST(fs_make_dirs(test_path("sub"), &e) &&
          image_write_png(test_path("sub/a b.png"), 3, 2, pixel, &e) &&
          image_write_png(test_path("sub/50%.png"), 3, 2, pixel, &e) &&
          image_write_exr(test_path("bright.exr"), &bright, &e));
-    image_free(&bright);
     test_write_text(test_path("text.png"), "no image");
     return 0;
 }

@@ -4,6 +4,7 @@
 #include "renderer/image/image_library.h"
 #include "renderer/math/sampler.h"
 #include "reference/base/process.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #include <dlfcn.h>
@@ -93,7 +94,7 @@ TEST(exr_of_any_shape)
     static const int shape[][3] = {{1, 1, 1}, {3, 16, 1}, {61, 17, 3}, {40, 33, 5}};
     for (size_t k = 0; k < 2 * COUNT(shape); k++) {
         const int *s = shape[k / 2];
-        struct image im;
+        OWN(image) im;
         struct err e = {""};
         assert_true(image_alloc(&im, s[0], s[1], s[2], channel, &e));
         for (int i = 0; i < s[0] * s[1] * s[2]; i++) {
@@ -106,10 +107,8 @@ TEST(exr_of_any_shape)
             memcpy(&im.data[i], &bits, sizeof bits);
         }
         MUST(image_write_exr(test_path("shape.exr"), &im, &e));
-        struct image got = read_both("shape.exr", false);
+        OWN(image) got = read_both("shape.exr", false);
         assert_same(&im, &got);
-        image_free(&im);
-        image_free(&got);
     }
 }
 
@@ -133,8 +132,7 @@ TEST(exr_as_others_write_it)
     };
     for (size_t i = 0; i < COUNT(cases); i++) {
         oiiotool(cases[i].options, "other.exr");
-        struct image im = read_both("other.exr", cases[i].is_half);
-        image_free(&im);
+        OWN(image) im = read_both("other.exr", cases[i].is_half);
     }
 }
 
@@ -146,9 +144,8 @@ TEST(hdr_as_others_write_it)
     const char *const *const options[] = {wide, narrow};
     for (int i = 0; i < 2; i++) {
         oiiotool(options[i], "other.hdr");
-        struct image im = read_both("other.hdr", false);
+        OWN(image) im = read_both("other.hdr", false);
         assert_int_equal(im.width, i == 0 ? WIDTH : 5);
-        image_free(&im);
     }
 }
 
@@ -192,7 +189,7 @@ TEST(png_texts)
     const struct image_attr text[] = {
         {"assay:seed", "7"}, {"assay:adaptive", ""}, {"assay:settings", words}};
     uint8_t pixel[BYTES];
-    struct image got;
+    OWN(image) got;
     struct err e = {""};
     for (size_t i = 0; i < sizeof pixel; i++)
         pixel[i] = (uint8_t)(i * 11 + i / 70);
@@ -204,7 +201,6 @@ TEST(png_texts)
         assert_string_equal(image_get_attr(&got, text[i].name), text[i].value);
     }
     assert_null(image_get_attr(&got, "assay:scene"));
-    image_free(&got);
 }
 
 static void write_odd_png(const char *path, int type, int bits, bool passes, bool clear)
@@ -455,13 +451,13 @@ TEST(colours_are_linear)
         {"rgb.exr", "3", "0.5,0.25,1.5", nothing, "float", {0.5, 0.25, 1.5}, 1e-6},
     };
     for (size_t i = 0; i < COUNT(cases); i++) {
-        struct image im = read_flat(cases[i].name, cases[i].channels, cases[i].colour,
-                                    cases[i].attribute, cases[i].depth);
+        OWN(image)
+        im = read_flat(cases[i].name, cases[i].channels, cases[i].colour, cases[i].attribute,
+                       cases[i].depth);
         for (int k = 0; k < 3 * 64; k++)
             if (!(fabs((double)im.data[k] - cases[i].expected[k % 3]) <= cases[i].tolerance))
                 fail_msg("%s: %g, expected %g", cases[i].name, (double)im.data[k],
                          cases[i].expected[k % 3]);
-        image_free(&im);
     }
     struct image im;
     struct err e = {""};
@@ -508,9 +504,8 @@ static int setup(void **state)
 {
     (void)state;
     struct err e = {""};
-    struct image im = make_image();
+    OWN(image) im = make_image();
     MUST(image_write_exr(test_path("source.exr"), &im, &e));
-    image_free(&im);
     return 0;
 }
 

@@ -1,6 +1,7 @@
 /* Moments against two passes over the same numbers, and their files. */
 #include "renderer/image/moments.h"
 #include "renderer/math/sampler.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 enum { N = 1000 };
@@ -48,12 +49,11 @@ static void check(const struct moments *m, uint32_t first, uint32_t last)
 TEST(online_equals_two_pass)
 {
     struct err e;
-    struct moments m;
+    OWN(moments) m;
     assert_true(moments_alloc(&m, 1, 1, &e));
     assert_true(isnan(moments_var_of_mean(&m, 0, 0)));
     add_range(&m, 0, N);
     check(&m, 0, N);
-    moments_free(&m);
 }
 
 TEST(merged_in_any_grouping)
@@ -94,8 +94,8 @@ TEST(unlike_moments_do_not_merge)
 TEST(write_and_read)
 {
     struct err e = {0};
-    struct moments m, back;
-    struct image im;
+    OWN(moments) m, back;
+    OWN(image) im;
     const char *path = test_path("m.exr");
     assert_true(moments_alloc(&m, 3, 2, &e));
     for (size_t p = 0; p < 6; p++)
@@ -117,7 +117,7 @@ TEST(write_and_read)
         }
     }
     /* Packed it is the same, and unpacked. */
-    struct moments packed;
+    OWN(moments) packed;
     MUST(moments_read_packed(path, &packed, &e));
     assert_true(packed.n == NULL);
     for (int pass = 0; pass < 2; pass++) {
@@ -128,10 +128,6 @@ TEST(write_and_read)
         MUST(moments_unpack(&packed, &e));
         assert_true(packed.n != NULL && packed.packed.n == NULL);
     }
-    moments_free(&packed);
-    moments_free(&m);
-    moments_free(&back);
-    image_free(&im);
 }
 
 static const char *const names[10] = {"R",    "G",    "B",    "M2.R", "M2.G",
@@ -159,7 +155,7 @@ TEST(bad_files)
     const char *path = test_path("bad.exr");
     for (size_t k = 0; k < sizeof fault / sizeof fault[0]; k++) {
         struct err e = {0};
-        struct image im;
+        OWN(image) im;
         struct moments m;
         assert_true(image_alloc(&im, 2, 2, fault[k].channels, names, &e));
         im.data[(size_t)fault[k].channels * 3 + (size_t)fault[k].at] = fault[k].value;
@@ -170,7 +166,6 @@ TEST(bad_files)
         assert_true(image_write_exr(path, &im, &e));
         REFUSES(moments_read(path, &m, NULL, &e), fault[k].expect);
         assert_memory_equal(e.msg, path, strlen(path));
-        image_free(&im);
     }
     /* Cut off in the middle, and not an image at all. */
     FILE *f = fopen(path, "r+b");
@@ -197,7 +192,7 @@ TEST(every_channel_of_the_last_pixel)
             bool good = isfinite(values[v]) && !((is_m2 || is_n) && values[v] < 0) &&
                         !(is_n && values[v] == 0.5f);
             struct moments m;
-            struct image im;
+            OWN(image) im;
             assert_true(image_alloc(&im, 3, 2, 10, names, &e));
             im.data[5 * 10 + c] = values[v];
             assert_true(image_set_attr(&im, "assay:spp", "0", &e));
@@ -208,7 +203,6 @@ TEST(every_channel_of_the_last_pixel)
                 moments_free(&m);
             else if (strstr(e.msg, "pixel (2, 1)") == NULL)
                 fail_msg("'%s' names another pixel", e.msg);
-            image_free(&im);
         }
 }
 
@@ -216,11 +210,10 @@ TEST(every_channel_of_the_last_pixel)
 TEST(failed_write_leaves_nothing)
 {
     struct err e = {0};
-    struct moments m;
+    OWN(moments) m;
     assert_true(moments_alloc(&m, 2, 2, &e));
     assert_false(moments_write("/nonexistent/m.exr", &m, NULL, 0, &e));
     assert_true(strncmp(e.msg, "/nonexistent/m.exr", 18) == 0);
-    moments_free(&m);
 }
 
 /* A copy holds all of it and shares nothing. */

@@ -7,6 +7,7 @@
  * 8 K u in the worst case; and if roundings were of random sign, about 8 sqrt(K) u. Drift would be an error that grows as K:
  * the test asks for 100 sqrt(K) u, a tenth of the worst case already at K = 15000, a thousandth of it at the end. */
 #include "renderer/image/moments.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 __extension__ typedef __int128 wide;
@@ -126,14 +127,13 @@ TEST(a_long_row_of_merges_does_not_drift)
 {
     enum { MERGES = 1000000 };
     struct blocks b;
-    struct moments all;
+    OWN(moments) all;
     struct sums sums = {0};
     struct err e;
     make_blocks(&b);
     assert_true(moments_alloc(&all, 1, 1, &e));
     merge_in_turn(&b, MERGES, &all, &sums);
     check("one after the other", &all, &sums, MERGES);
-    moments_free(&all);
     free_blocks(&b);
 }
 
@@ -159,7 +159,7 @@ TEST(drift_would_be_seen)
 {
     enum { MERGES = 100000 };
     struct blocks b;
-    struct moments all;
+    OWN(moments) all;
     struct sums sums = {0};
     struct err e;
     make_blocks(&b);
@@ -168,6 +168,5 @@ TEST(drift_would_be_seen)
     merge_in_turn(&b, MERGES, &all, &sums);
     double each[3];
     assert_true(worst_error(&all, &sums, each) > 100 * sqrt(MERGES) * 0x1p-53);
-    moments_free(&all);
     free_blocks(&b);
 }

@@ -4,6 +4,7 @@
 #include "renderer/image/image_oiio.h"
 #include "renderer/image/tone.h"
 #include "renderer/pathtracer/output.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #include <sys/stat.h>
@@ -96,7 +97,7 @@ static void fill(struct film *f, int from, int height)
 static void check_pixels(const char *path, int height, const int *grey, bool rate)
 {
     struct err e = {0};
-    struct image im;
+    OWN(image) im;
     MUST(image_read(path, &im, NULL, &e));
     assert_int_equal(im.width, WIDTH);
     assert_int_equal(im.height, height);
@@ -104,7 +105,6 @@ static void check_pixels(const char *path, int height, const int *grey, bool rat
         for (int c = 0; c < 3; c++)
             assert_int_equal(lrintf(255 * im.data[p * im.channels + c]),
                              rate ? rates[4 - p % 4].rgb8[c] : grey[(p + c) % 3]);
-    image_free(&im);
 }
 
 static void check_picture(const char *path, int height, bool cgl)
@@ -120,8 +120,8 @@ static void check_rates(const char *path, int height)
 static void check_moments(const char *path, int height, const char *seconds)
 {
     struct err e = {0};
-    struct image im;
-    struct moments m;
+    OWN(image) im;
+    OWN(moments) m;
     MUST(moments_read(path, &m, &im, &e));
     assert_int_equal(m.width, WIDTH);
     assert_int_equal(m.height, height);
@@ -150,18 +150,15 @@ static void check_moments(const char *path, int height, const char *seconds)
         assert_string_equal(image_get_attr(&im, "assay:rays"),
                             "7 rays, 5 box tests, 3 primitive tests");
     }
-    moments_free(&m);
-    image_free(&im);
 }
 
 /* A tEXt chunk: name, 0, text. */
 static bool says(const char *path, const char *name, const char *text)
 {
     size_t size, length = strlen(name) + 1 + strlen(text);
-    struct image im;
+    OWN(image) im;
     struct err e = {0};
     MUST(image_read(path, &im, NULL, &e));
-    image_free(&im);
     FILE *f = fopen(path, "rb");
     char bytes[4096], wanted[128];
     size = fread(bytes, 1, sizeof bytes, f);
@@ -262,9 +259,8 @@ static void caught(FILE *stream, int fd, void (*tell)(const struct output *, con
     fflush(stream);
     dup2(before, fd);
     close(before);
-    char *text = test_read(test_path("said"));
+    OWN_TEXT text = test_read(test_path("said"));
     assert_string_equal(text, expected);
-    free(text);
 }
 
 static void summary(const struct output *o, const struct film *f)
@@ -279,7 +275,7 @@ TEST(summary_of_the_image)
 {
     struct err e = {0};
     struct render r;
-    struct film f;
+    OWN(film) f;
     set(&r, "x.exr", NULL);
     MUST(film_alloc(&f, WIDTH, 2, false, &e));
     for (int p = 0; p < 6; p++) {
@@ -299,7 +295,6 @@ TEST(summary_of_the_image)
     r.opt.resume = "x.exr";
     caught(stderr, STDERR_FILENO, output_print_how_to_resume, &r, &f,
            "pathtracer: interrupted after 3 of 16 samples per pixel; to go on:\npathtracer -s 4\n");
-    film_free(&f);
 }
 
 static struct render_stats told_stats;
@@ -315,7 +310,7 @@ TEST(what_is_said_of_a_render)
 {
     struct err e = {0};
     struct render r;
-    struct film f;
+    OWN(film) f;
     set(&r, "x.exr", "folder/y.png");
     r.opt.quiet = false;
     MUST(film_alloc(&f, WIDTH, 2, false, &e));
@@ -349,7 +344,6 @@ TEST(what_is_said_of_a_render)
         stderr, STDERR_FILENO, told, &r, &f,
         "1 paths, 0 rays in 0.00 s (0.00 CPU s); per ray 0.0 box and 0.0 primitive tests; brute force\n"
         "written: x.exr folder/y.png folder/y_rate.png\n");
-    film_free(&f);
 }
 
 /* Where the images cannot be: beside them, if only their names cannot; else in TMPDIR, all under new names, and the line
@@ -358,7 +352,7 @@ TEST(rescued_images)
 {
     struct err e = {0};
     struct render r;
-    struct film f;
+    OWN(film) f;
     char words_said[1024], from[600];
     const char *folder = test_path("none/a.exr"), *tmp = test_path("spare");
     assert_int_equal(mkdir(tmp, 0700), 0);
@@ -395,7 +389,6 @@ TEST(rescued_images)
     assert_int_equal(chdir(from), 0);
     unsetenv("TMPDIR");
     assert_string_equal(e.msg, "disk full");
-    film_free(&f);
 }
 
 /* A state and a rate map that cannot be are told before the render as images are. */

@@ -2,6 +2,7 @@
 #include "renderer/shading/light.h"
 #include "renderer/scene/cs184_deviations.h"
 #include "tests/support/build_scene.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 /* A lamp of unit radiance that faces down, about (0, height, 0). */
@@ -67,9 +68,8 @@ TEST(a_density_without_a_distance)
     for (float height = 0.5f; height < 3; height *= 2)
         for (int defect = 0; defect < 2; defect++) {
             vec3 most;
-            struct scene s = lamp(1, 0.5f, height, defect ? 1u << CS184_LIGHT_PDF : 0);
+            OWN(scene) s = lamp(1, 0.5f, height, defect ? 1u << CS184_LIGHT_PDF : 0);
             expect(sampled_irradiance(&s, p, &most), irradiance(1, 0.5f, height, p, defect != 0));
-            scene_free(&s);
         }
 }
 
@@ -78,7 +78,7 @@ TEST(a_lamp_that_is_turned)
 {
     const vec3 p = v3(1.2f, 0, 0.1f);
     vec3 most;
-    struct scene s = lamp(2, 0.5f, 1, 1u << CS184_TURNED_LAMP);
+    OWN(scene) s = lamp(2, 0.5f, 1, 1u << CS184_TURNED_LAMP);
     vec3 seen = v3(0, 0, 0);
     for (int i = 0; i < 6; i++) {
         assert_true(fabsf(s.position[i].y - 1) < 1e-6f);
@@ -91,17 +91,15 @@ TEST(a_lamp_that_is_turned)
     expect(got, irradiance(2, 0.5f, 1, p, false));
     /* Told from what is seen. */
     assert_true(fabs(irradiance(0.5f, 2, 1, p, false) / got - 1) > 0.1);
-    scene_free(&s);
 }
 
 /* Only lamps of two triangles are rectangles. */
 TEST(other_lamps_stay)
 {
     struct err e = {""};
-    struct scene s = build_scene();
+    OWN(scene) s = build_scene();
     build_triangle(&s, v3(0, 1, 0), v3(1, 1, 0), v3(0, 1, 1), build_material(&s, grey(0), grey(1)));
     MUST(scene_finish(&s, "test", &e));
     cs184_deviations_apply(&s, 1u << CS184_TURNED_LAMP);
     assert_true(s.position[1].x == 1 && s.position[1].z == 0 && s.position[2].z == 1);
-    scene_free(&s);
 }

@@ -4,6 +4,7 @@
 #include "renderer/math/sampler.h"
 #include "renderer/math/warp.h"
 #include "tests/support/sky.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #include <gsl/gsl_cdf.h>
@@ -251,12 +252,11 @@ TEST(totals)
 static void must_refuse(const struct sky *s, const char *drop, const char *keyword)
 {
     struct err e = {""};
-    struct image im = sky_image(s);
+    OWN(image) im = sky_image(s);
     if (drop != NULL)
         strcpy(im.names[image_channel(&im, drop)], "Z");
     REFUSES(environment_from_image(&im, "x.exr", &e) != NULL, keyword);
     assert_memory_equal(e.msg, "x.exr: ", 7);
-    image_free(&im);
 }
 
 TEST(bad_texels_are_named)
@@ -298,9 +298,8 @@ TEST(files)
     test_write(test_path("light.hdr"), hdr, sizeof hdr - 1);
     check_two_texels(test_path("light.hdr"));
     const struct sky s = {.width = 2, .height = 1, .value = {1, 0.5f}};
-    struct image im = sky_image(&s);
+    OWN(image) im = sky_image(&s);
     MUST(image_write_exr(test_path("float.exr"), &im, &e));
-    image_free(&im);
     check_two_texels(test_path("float.exr"));
     REFUSES(environment_read(test_path("none.exr"), &e) != NULL, "none.exr: cannot read");
     REFUSES(environment_read(test_path("sky.png"), &e) != NULL,

@@ -1,5 +1,6 @@
 /* scene_finish(): lights of emissive objects, areas, bounds, and what it refuses. */
 #include "renderer/scene/scene.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 static void *copy(const void *data, size_t size)
@@ -48,7 +49,7 @@ static struct scene make_scene(void)
 
 TEST(area_lights_follow_delta_lights)
 {
-    struct scene s = make_scene();
+    OWN(scene) s = make_scene();
     struct err e = {""};
     assert_true(scene_finish(&s, "test", &e));
     assert_int_equal(s.num_lights, 4);
@@ -67,13 +68,12 @@ TEST(area_lights_follow_delta_lights)
     }
     const int32_t expected[4] = {-1, -1, 1, 1};
     assert_memory_equal(s.tri_light, expected, sizeof expected);
-    scene_free(&s);
 }
 
 /* Corners by hand: the first sphere reaches x = -5, y = 2, z = +-2; the second y = -7.5. */
 TEST(bounds_hold_triangles_and_spheres)
 {
-    struct scene s = make_scene();
+    OWN(scene) s = make_scene();
     struct err e = {""};
     assert_true(scene_finish(&s, "test", &e));
     const vec3 lo = {-5, -7.5f, -2}, hi = {6, 4, 9};
@@ -81,7 +81,6 @@ TEST(bounds_hold_triangles_and_spheres)
     assert_memory_equal(&s.bounds_max, &hi, sizeof hi);
     assert_memory_equal(&s.frame_min, &lo, sizeof lo);
     assert_memory_equal(&s.frame_max, &hi, sizeof hi);
-    scene_free(&s);
 }
 
 TEST(free_zeroes)
@@ -176,12 +175,11 @@ static const char *spoil(struct scene *s, int way)
 TEST(bad_scenes_are_refused)
 {
     for (int way = 0; way < WAYS; way++) {
-        struct scene s = make_scene();
+        OWN(scene) s = make_scene();
         struct err e = {""};
         const char *says = spoil(&s, way);
         REFUSES(scene_finish(&s, "room.dae", &e), says);
         assert_memory_equal(e.msg, "room.dae: ", 10);
-        scene_free(&s);
     }
 }
 
@@ -214,12 +212,11 @@ static float *number_of(struct scene *s, enum part part, size_t offset)
 /* No division by its size: bounds of 0. */
 TEST(nothing_is_a_scene)
 {
-    struct scene s = make_scene();
+    OWN(scene) s = make_scene();
     struct err e = {""};
     s.num_triangles = s.num_spheres = s.num_objects = 0;
     MUST(scene_finish(&s, "room.dae", &e));
     assert_true(s.num_lights == 1 && length(s.bounds_min) == 0 && length(s.frame_max) == 0);
-    scene_free(&s);
 }
 
 TEST(every_number_is_looked_at)
@@ -278,7 +275,7 @@ TEST(every_number_is_looked_at)
     for (size_t i = 0; i < COUNT(of); i++)
         for (int k = 0; k < of[i].count; k++)
             for (int v = 0; v < 7; v++) {
-                struct scene s = make_scene();
+                OWN(scene) s = make_scene();
                 struct err e = {""};
                 float *x = number_of(&s, of[i].part, of[i].offset) + k;
                 bool is_direction = strstr(of[i].says, "direction") != NULL;
@@ -289,7 +286,6 @@ TEST(every_number_is_looked_at)
                 bool ok = scene_finish(&s, "room.dae", &e);
                 if (ok != (v < 3) || (!ok && strstr(e.msg, of[i].says) == NULL))
                     fail_msg("%s, number %d, %g: '%s'", of[i].says, k, (double)*x, e.msg);
-                scene_free(&s);
             }
 #undef POSITIVE
 #undef SHARE

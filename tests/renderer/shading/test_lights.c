@@ -4,6 +4,7 @@
 #include "tests/support/render_check.h"
 #include "tests/support/sky.h"
 #include "tests/support/mesh.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #include <gsl/gsl_integration.h>
@@ -84,7 +85,7 @@ TEST(uneven_sky)
     const struct sky sky = sky_uneven(16, 8);
     for (int k = 0; k < 5; k++) {
         const double *n = normals[k], opposite[3] = {-n[0], -n[1], -n[2]};
-        struct scene s = plate(v3((float)n[0], (float)n[1], (float)n[2]), 0.7f);
+        OWN(scene) s = plate(v3((float)n[0], (float)n[1], (float)n[2]), 0.7f);
         give_sky(&s, sky_environment(&sky));
         check_finish(&s);
         double expected = 0.7 / M_PI * sky_irradiance(&sky, n);
@@ -97,7 +98,6 @@ TEST(uneven_sky)
             if (direct == DIRECT_LIGHT || direct == DIRECT_MIS)
                 assert_false(check_agrees(&film, 0, 1.05 * expected));
         }
-        scene_free(&s);
     }
 }
 
@@ -110,7 +110,7 @@ TEST(bright_texel)
 {
     struct sky sky = {.width = 32, .height = 16};
     sky.value[3 * 32 + 11] = 1000;
-    struct scene s = plate(v3(0, 1, 0), 0.5f);
+    OWN(scene) s = plate(v3(0, 1, 0), 0.5f);
     give_sky(&s, sky_environment(&sky));
     check_finish(&s);
     double theta = 3.5 * M_PI / 16, d = M_PI / 16, azimuth = 2 * M_PI / 32;
@@ -129,7 +129,6 @@ TEST(bright_texel)
             assert_false(check_agrees(&film, 1, 1.05 * 2 * expected));
         }
     }
-    scene_free(&s);
 }
 
 /* What one looks at in direction w: nothing but sky; by a mirror; through glass of index 1; and,
@@ -179,7 +178,7 @@ TEST(seen_directly_and_in_mirrors)
         for (int view = 0; view < NUM_VIEWS; view++)
             for (int direct = 0; direct_kind_names[direct] != NULL; direct++) {
                 vec3 w = v3(directions[k][0], directions[k][1], directions[k][2]);
-                struct scene s = catalogue_view_scene((enum view)view, w, 0.8f);
+                OWN(scene) s = catalogue_view_scene((enum view)view, w, 0.8f);
                 give_sky(&s, sky_environment(&sky));
                 check_finish(&s);
                 struct integrator_options io = paths(direct, 2);
@@ -193,14 +192,13 @@ TEST(seen_directly_and_in_mirrors)
                 if (fabs(film.mean[0] - expected) > 1e-3 + 2e-3 * expected)
                     fail_msg("direction %d, view %d, %s: %.6f, expected %.6f", k, view,
                              direct_kind_names[direct], film.mean[0], expected);
-                scene_free(&s);
             }
 }
 
 TEST(glass_in_a_constant_sky)
 {
     struct err e;
-    struct scene s = catalogue_view_scene(VIEW_NO_GLASS, v3(0, 0, -1), 1);
+    OWN(scene) s = catalogue_view_scene(VIEW_NO_GLASS, v3(0, 0, -1), 1);
     s.materials[0].ior = 1.5f;
     s.camera.hfov = 0.3f;
     give_sky(&s, environment_constant(grey(3), &e));
@@ -212,7 +210,6 @@ TEST(glass_in_a_constant_sky)
     io.max_bounces = 2;
     film = check_look(&s, io, 8, 64);
     assert_false(check_agrees(&film, 0, 3));
-    scene_free(&s);
 }
 
 /* The assignment's ambient light: a plate that looks up gets pi L, one that looks sideways half of
@@ -223,7 +220,7 @@ TEST(upper_half)
     static const float normals[3][3] = {{0, 1, 0}, {1, 0, 0}, {0, -1, 0}};
     for (int k = 0; k < 3; k++)
         for (int direct = 0; direct_kind_names[direct] != NULL; direct++) {
-            struct scene s = plate(v3(normals[k][0], normals[k][1], normals[k][2]), 0.7f);
+            OWN(scene) s = plate(v3(normals[k][0], normals[k][1], normals[k][2]), 0.7f);
             give_sky(&s, environment_upper_half(grey(2), &e));
             check_finish(&s);
             struct integrator_options io = paths(direct, 1);
@@ -231,16 +228,14 @@ TEST(upper_half)
             double expected = 0.7 * 2 * (1 - 0.5 * k);
             check_mean(&film, 0, expected, direct_kind_names[direct]);
             assert_false(check_agrees(&film, 0, expected + 0.07));
-            scene_free(&s);
         }
     for (int view = 0; view < NUM_VIEWS; view++) {
-        struct scene s = catalogue_view_scene((enum view)view, v3(0, 1, 0), 0.8f);
+        OWN(scene) s = catalogue_view_scene((enum view)view, v3(0, 1, 0), 0.8f);
         give_sky(&s, environment_upper_half(grey(2), &e));
         check_finish(&s);
         struct integrator_options io = paths(DIRECT_MIS, 3);
         struct check_result film = check_look(&s, io, 2, 16);
         check_mean(&film, 0, 0, "hidden");
-        scene_free(&s);
     }
 }
 
@@ -265,27 +260,23 @@ TEST(sky_or_sphere_of_emitters)
 {
     struct err e;
     struct integrator_options io = paths(DIRECT_MIS, 3);
-    struct scene sphere = corner_scene();
+    OWN(scene) sphere = corner_scene();
     build_sphere(&sphere, v3(0, 0, 0), 50, -1, build_material(&sphere, grey(0), grey(2)));
     check_finish(&sphere);
-    struct moments reference = check_render(&sphere, io, 32, 24, 256);
-    scene_free(&sphere);
+    OWN(moments) reference = check_render(&sphere, io, 32, 24, 256);
     for (int direct = 0; direct_kind_names[direct] != NULL; direct++)
         for (int dim = 0; dim < 2; dim++) {
-            struct scene s = corner_scene();
+            OWN(scene) s = corner_scene();
             give_sky(&s, environment_constant(grey(dim ? 1.94f : 2), &e));
             check_finish(&s);
             io.sampler.seed++;
             io.direct = (enum direct_kind)direct;
-            struct moments film = check_render(&s, io, 32, 24, 256);
+            OWN(moments) film = check_render(&s, io, 32, 24, 256);
             double z = check_z(&film, &reference, 0);
             if ((fabs(z) > CHECK_Z_LIMIT) != (dim != 0))
                 fail_msg("%s, %s: z = %.2f", direct_kind_names[direct], dim ? "3 % less" : "equal",
                          z);
-            moments_free(&film);
-            scene_free(&s);
         }
-    moments_free(&reference);
 }
 
 /* rho/pi I cos(alpha)^e cos(theta)/d^2 inside the cone, 0 outside; no noise. The lamp is at
@@ -298,7 +289,7 @@ TEST(spot_light)
                  {50, 90, 1.5}, {89, 90, 1}, {91, 90, 0}, {160, 90, 2}};
     const vec3 at = v3(0.6f, 0.8f, -0.5f);
     for (size_t k = 0; k < sizeof spots / sizeof *spots; k++) {
-        struct scene s = plate(v3(0, 1, 0), 0.7f);
+        OWN(scene) s = plate(v3(0, 1, 0), 0.7f);
         frame f = frame_from_normal(normalize(neg(at)));
         float off = (float)(spots[k].off * M_PI / 180);
         vec3 axis = add(scale(f.n, cosf(off)), scale(f.t, sinf(off)));
@@ -321,7 +312,6 @@ TEST(spot_light)
                     assert_false(check_agrees(&film, c, expected / share));
             }
         }
-        scene_free(&s);
     }
 }
 
@@ -332,7 +322,7 @@ TEST(triangles_of_a_mesh_lamp_by_area)
 {
     enum { N = 40, STEPS = 20000 };
     struct err e;
-    struct scene s = build_scene();
+    OWN(scene) s = build_scene();
     uint32_t m = build_material(&s, grey(0), grey(1));
     double height[N], all = 0;
     for (int k = 0; k < N; k++) {
@@ -359,7 +349,6 @@ TEST(triangles_of_a_mesh_lamp_by_area)
     for (int k = 0; k < N; k++)
         assert_near(count[k], STEPS * height[k] / all, 1.5);
     light_table_free(t);
-    scene_free(&s);
 }
 
 /* At a plate's middle a lamp of each kind is chosen in proportion to its irradiance there, a closed form each: I cos/d^2,
@@ -368,7 +357,7 @@ TEST(triangles_of_a_mesh_lamp_by_area)
 TEST(choice_is_by_irradiance)
 {
     struct err e;
-    struct scene s = plate(v3(0, 1, 0), 0.5f);
+    OWN(scene) s = plate(v3(0, 1, 0), 0.5f);
     const vec3 up = v3(0, 1, 0), down = v3(0, -1, 0), at = v3(1, 1, 0);
     const float falls[][3] = {{0, 0, 1}, {2, 0, 0}};
     for (int k = 0; k < 2; k++)
@@ -432,7 +421,6 @@ TEST(choice_is_by_irradiance)
     for (uint32_t i = 0; i < N; i++)
         assert_int_equal(light_choice_probability(t, i, p, down) > 0, i == 2 || i == 6 || i == 8);
     light_table_free(t);
-    scene_free(&s);
 }
 
 static vec3 random_point(uint32_t i, uint32_t k)
@@ -529,7 +517,7 @@ static double rectangle_irradiance(vec3 p, float width, float depth)
  * chosen by place, and what the renderer does by itself, which is the latter to the bit. */
 TEST(a_hundred_lights)
 {
-    struct scene s = plate(v3(0, 1, 0), 0.6f);
+    OWN(scene) s = plate(v3(0, 1, 0), 0.6f);
     double irradiance = 0, lamps = 0, brightest = 0;
     for (int i = 0; i < 60; i++) {
         vec3 at =
@@ -572,7 +560,6 @@ TEST(a_hundred_lights)
         for (int many = LIGHTS_AUTO; many <= LIGHTS_ONE; many++)
             moments_free(&film[many]);
     }
-    scene_free(&s);
 }
 
 /* A sky map, spheres, lamps and a spot together, three bounces: every estimator, all lights or one
@@ -580,7 +567,7 @@ TEST(a_hundred_lights)
 TEST(all_or_one_of_the_lights)
 {
     const struct sky sky = sky_uneven(16, 8);
-    struct scene s = corner_scene();
+    OWN(scene) s = corner_scene();
     give_sky(&s, sky_environment(&sky));
     build_spot(&s, v3(0.5f, 1.4f, 0.8f), v3(0, -1, 0), 0.5f, 2, grey(3));
     for (int i = 0; i < 10; i++)
@@ -589,27 +576,23 @@ TEST(all_or_one_of_the_lights)
     check_finish(&s);
     struct integrator_options io = paths(DIRECT_MIS, 3);
     io.many_lights = LIGHTS_ALL;
-    struct moments reference = check_render(&s, io, 32, 24, 256);
+    OWN(moments) reference = check_render(&s, io, 32, 24, 256);
     for (int direct = 0; direct_kind_names[direct] != NULL; direct++)
         for (int many = LIGHTS_ALL; many <= LIGHTS_ONE; many++) {
             io.sampler.seed++;
             io.direct = (enum direct_kind)direct;
             io.many_lights = (enum many_lights)many;
-            struct moments film = check_render(&s, io, 32, 24, 128);
+            OWN(moments) film = check_render(&s, io, 32, 24, 128);
             double z = check_z(&film, &reference, 0);
             if (fabs(z) > CHECK_Z_LIMIT)
                 fail_msg("%s, %s: z = %.2f", direct_kind_names[direct],
                          many == LIGHTS_ALL ? "all" : "one", z);
-            moments_free(&film);
         }
     /* Negative control: one lamp of the twelve less. */
     s.materials[s.num_materials - 1].radiance = grey(0);
     io.direct = DIRECT_MIS;
-    struct moments dark = check_render(&s, io, 32, 24, 256);
+    OWN(moments) dark = check_render(&s, io, 32, 24, 256);
     assert_true(fabs(check_z(&dark, &reference, 0)) > CHECK_Z_LIMIT);
-    moments_free(&dark);
-    moments_free(&reference);
-    scene_free(&s);
 }
 
 /* A rectangle over a plate whose halves glow in other colours, texel by texel (nearest), cut into strips of as many triangles as a
@@ -622,7 +605,7 @@ TEST(textured_lamp_over_textured_plate)
     const double half[2] = {rectangle_irradiance(v3(-1, 1, -0.4f), 1.2f, 1),
                             rectangle_irradiance(v3(0.2f, 1, -0.4f), 1.2f, 1)};
     for (int many = 0; many < 2; many++) {
-        struct scene s = plate(v3(0, 1, 0), 1);
+        OWN(scene) s = plate(v3(0, 1, 0), 1);
         s.materials[0].reflectance_map = build_texture(&s, 2, 1, ramp, false, TEXTURE_CLAMP);
         uint32_t lamp = build_material(&s, grey(0), grey(0.7f));
         s.materials[lamp].radiance_map = build_texture(&s, 2, 1, halves, true, TEXTURE_WRAP);
@@ -648,7 +631,6 @@ TEST(textured_lamp_over_textured_plate)
                     assert_false(check_agrees(&film, c, (double)albedo[c] / M_PI * turned));
                 }
             }
-        scene_free(&s);
     }
 }
 

@@ -4,6 +4,7 @@
  * negative control that the same test must reject. */
 #include "tests/support/optics.h"
 #include "tests/support/render_check.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #include <gsl/gsl_integration.h>
@@ -49,7 +50,7 @@ TEST(corridor_of_mirrors)
         for (int high = 0; high < 2; high++) {
             double y = n + (high ? 0.8 : 0.3), degrees = atan((y - 0.5) / 10) / DEGREE;
             double there = n % 2 ? 1 - (y - n) : y - n, emitted = there < 0.5 ? 1 : 3;
-            struct scene s = build_scene();
+            OWN(scene) s = build_scene();
             uint32_t top = smooth(&s, MATERIAL_MIRROR, (rgb){1, 0.9f, 0.5f}, grey(0), 0);
             uint32_t floor = smooth(&s, MATERIAL_MIRROR, (rgb){0.8f, 1, 0.3f}, grey(0), 0);
             build_quad(&s, v3(-5, 1, -10), v3(10, 0, 0), v3(0, 0, 12), top);
@@ -88,7 +89,6 @@ TEST(corridor_of_mirrors)
                     expected *= k % 2 ? lower[1] : upper[1];
                 check_mean(&r, 1, expected, "roulette");
             }
-            scene_free(&s);
         }
 }
 
@@ -141,8 +141,9 @@ TEST(plate_of_glass)
             bool tinted = kind == 1;
             const double r[3] = {1, tinted ? 0.7 : 1, tinted ? 0.5 : 1};
             const double t[3] = {1, tinted ? 0.9 : 1, tinted ? 0.6 : 1};
-            struct scene s = plate_scene((rgb){(float)r[0], (float)r[1], (float)r[2]},
-                                         (rgb){(float)t[0], (float)t[1], (float)t[2]}, kind == 2);
+            OWN(scene)
+            s = plate_scene((rgb){(float)r[0], (float)r[1], (float)r[2]},
+                            (rgb){(float)t[0], (float)t[1], (float)t[2]}, kind == 2);
             aim(&s, v3(50, (float)(-tan(angle[a] * DEGREE)), 1), angle[a]);
             check_finish(&s);
             double c = cos(angle[a] * DEGREE), back = sqrt(1 - (1 - c * c) / 2.25);
@@ -174,7 +175,6 @@ TEST(plate_of_glass)
                         check_agrees(&got, 0, 3 * plate(other, other, 1, 1, 4).transmitted));
                 }
             }
-            scene_free(&s);
         }
 }
 
@@ -205,7 +205,7 @@ TEST(glass_ball_in_a_furnace)
     for (size_t i = 0; i < sizeof ior / sizeof *ior; i++)
         for (int hollow = 0; hollow < 2; hollow++)
             for (int curve = 0; curve < 2; curve++) {
-                struct scene s = furnace();
+                OWN(scene) s = furnace();
                 uint32_t glass = smooth(&s, MATERIAL_GLASS, grey(1), grey(1), ior[i]);
                 s.materials[glass].schlick = curve == 1;
                 build_sphere(&s, v3(0, 0, 0), 1, 1, glass);
@@ -224,7 +224,6 @@ TEST(glass_ball_in_a_furnace)
                 /* Negative control: too few bounces lose light. */
                 r = check_look(&s, options(DIRECT_MIS, hollow ? 4 : 2), 16, 64);
                 assert_true(ior[i] == 1 || r.mean[0] < 1 - 1e-3);
-                scene_free(&s);
             }
 }
 
@@ -233,14 +232,13 @@ TEST(glass_ball_in_a_furnace)
 TEST(camera_inside_glass)
 {
     for (int kind = 0; kind < 2; kind++) {
-        struct scene s = furnace();
+        OWN(scene) s = furnace();
         uint32_t glass =
             smooth(&s, kind ? MATERIAL_GLASS : MATERIAL_REFRACTION, grey(1), grey(1), 1.5f);
         build_sphere(&s, v3(0, 0, 0), 1, 1, glass);
         build_camera(&s, v3(0.1f, 0.2f, -0.2f), 100);
         check_finish(&s);
         check_furnace(&s, 2.25, "inside", kind ? 1000 : 1);
-        scene_free(&s);
     }
 }
 
@@ -251,7 +249,7 @@ TEST(warm_ball_inside_glass)
 {
     static const float rho[] = {0, 0.5f, 1};
     for (int i = 0; i < 3; i++) {
-        struct scene s = furnace();
+        OWN(scene) s = furnace();
         uint32_t glass = smooth(&s, MATERIAL_GLASS, grey(1), grey(1), 1.5f);
         float e = (1 - rho[i]) * 2.25f;
         build_sphere(&s, v3(0, 0, 0), 1, 1, glass);
@@ -260,7 +258,6 @@ TEST(warm_ball_inside_glass)
         build_camera(&s, v3(0, 0, 2.5f), 40);
         check_finish(&s);
         check_furnace(&s, 1, "warm ball", 1000);
-        scene_free(&s);
     }
 }
 
@@ -271,7 +268,7 @@ TEST(refraction_alone)
     static const double angle[] = {0, 20, 41, 42.5, 70};
     for (size_t a = 0; a < sizeof angle / sizeof *angle; a++)
         for (int inside = 0; inside < 2; inside++) {
-            struct scene s = plate_scene(grey(0), (rgb){0.5f, 1, 0.8f}, false);
+            OWN(scene) s = plate_scene(grey(0), (rgb){0.5f, 1, 0.8f}, false);
             s.materials[0].kind = MATERIAL_REFRACTION;
             float z = inside ? -0.25f : 1;
             aim(&s, v3(50, 0, z), angle[a]);
@@ -285,7 +282,6 @@ TEST(refraction_alone)
                 check_mean(&r, 2, total ? 0 : b, "refraction");
                 assert_false(check_agrees(&r, 2, total ? b : b / 2.25));
             }
-            scene_free(&s);
         }
 }
 
@@ -448,7 +444,7 @@ TEST(lamp_in_a_rough_plate)
     static const float alpha[] = {0.15f, 0.5f};
     const double centre[3] = {0.5, 1.2, 1.5}, wo[3] = {0, -sin(50 * DEGREE), cos(50 * DEGREE)};
     for (int i = 0; i < 4; i++) {
-        struct scene s = build_scene();
+        OWN(scene) s = build_scene();
         uint32_t m = build_material(&s, grey(1), grey(0));
         s.materials[m] = rough(i % 2, i % 2, alpha[i / 2], true);
         build_quad(&s, v3(-1, -1, 0), v3(2, 0, 0), v3(0, 2, 0), m);
@@ -478,7 +474,6 @@ TEST(lamp_in_a_rough_plate)
                 }
             }
         }
-        scene_free(&s);
     }
 }
 
@@ -489,7 +484,7 @@ TEST(lamp_in_a_plastic_plate)
     const double centre[3] = {0.5, 1.2, 1.5}, wo[3] = {0, -sin(50 * DEGREE), cos(50 * DEGREE)};
     static const double kd[] = {.3, .2, .1}, ks[] = {.4, .5, .3};
     for (int i = 0; i < 4; i++) {
-        struct scene s = build_scene();
+        OWN(scene) s = build_scene();
         uint32_t m = plastic(&s, i % 2 ? 0.5f : 0.15f, i / 2 ? 0.2f : 0);
         build_quad(&s, v3(-1, -1, 0), v3(2, 0, 0), v3(0, 2, 0), m);
         build_sphere(&s, v3((float)centre[0], (float)centre[1], (float)centre[2]), 0.4f, 1,
@@ -511,6 +506,5 @@ TEST(lamp_in_a_plastic_plate)
                 assert_false(check_agrees(&r, 1, kd[1] * even));
             }
         }
-        scene_free(&s);
     }
 }

@@ -4,6 +4,7 @@
 #include "renderer/pathtracer/output.h"
 #include "renderer/pathtracer/checkpoint.h"
 #include "tests/support/build_scene.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 struct fixture {
@@ -238,22 +239,20 @@ TEST(ranges_add_up)
 static void expect_no_state(const char *path, const struct render_id *id, const char *why)
 {
     struct err e = {0};
-    struct film film;
+    OWN(film) film;
     assert_true(film_alloc(&film, SIZE, SIZE, false, &e));
     REFUSES(checkpoint_read(path, id, &film, &e), why);
     assert_memory_equal(e.msg, path, strlen(path));
-    film_free(&film);
 }
 
 TEST(bad_states)
 {
     const char *path = test_path("bad.state");
     struct err e = {0};
-    struct film film;
+    OWN(film) film;
     expect_no_state(path, &some_id, "No such file");
     assert_true(film_alloc(&film, SIZE, SIZE, false, &e));
     assert_true(checkpoint_write(path, &some_id, &film, &e));
-    film_free(&film);
     struct render_id id = some_id;
     strcpy(id.seed, "78");
     expect_no_state(path, &id, "'seed 77' there, 'seed 78' here");
@@ -328,14 +327,13 @@ TEST(stops_by_time)
     rare_bright_samples(&f);
     struct render_options o = options_of(1 << 24);
     struct render_control c = {.max_seconds = 0.2};
-    struct film film;
+    OWN(film) film;
     struct err e = {0};
     assert_true(film_alloc(&film, SIZE, SIZE, false, &e));
     struct render_stats stats = go_on(&f, &o, &c, &film);
     assert_true(stats.end == RENDER_TIME && film.num_samples >= 1);
     for (size_t p = 0; p < SIZE * SIZE; p++)
         assert_true(film.m.n[p] == film.num_samples);
-    film_free(&film);
     drop(&f);
 }
 
@@ -428,13 +426,12 @@ TEST(rule_is_biased_and_pilot_is_not)
     struct render_options share = o;
     share.first_sample = 40;
     share.num_samples = 100;
-    struct film part = start(&f, &share, NULL, false);
+    OWN(film) part = start(&f, &share, NULL, false);
     for (size_t p = 0; p < SIZE * SIZE; p++) {
         double n = film.m.n[p] - 40;
         assert_true(part.target[p] == film.target[p]);
         assert_true(part.m.n[p] == (n < 0 ? 0 : n > 100 ? 100 : n));
     }
-    film_free(&part);
     film_free(&film);
     drop(&f);
 }
@@ -456,7 +453,7 @@ TEST(layers_of_a_wall)
     struct film film = start(&f, &o, NULL, true), without = start(&f, &o, NULL, false);
     assert_true(same_doubles(film.m.m3, without.m.m3, 3 * SIZE * SIZE));
     struct err e = {0};
-    struct image im;
+    OWN(image) im;
     assert_true(film_layers(&film, &im, &e));
     const float *z = im.data + image_channel(&im, "depth.Z");
     const float *hits = im.data + image_channel(&im, "depth.hits");
@@ -479,7 +476,6 @@ TEST(layers_of_a_wall)
     }
     /* The edge, 0.3/3 from the middle of an image 2 tan(30 deg) wide, crosses one column of pixels. */
     assert_true(seen[0] > 500 && seen[1] == SIZE && seen[2] > 300);
-    image_free(&im);
     film_free(&film);
     film_free(&without);
     drop(&f);
@@ -522,16 +518,14 @@ TEST(albedo_layer_of_materials)
         build_camera(&f.scene, v3(0, 0, 0), 60);
         finish(&f, SIZE, SIZE);
         struct render_options o = options_of(2);
-        struct film film = start(&f, &o, NULL, true);
+        OWN(film) film = start(&f, &o, NULL, true);
         struct err e = {0};
-        struct image im;
+        OWN(image) im;
         MUST(film_layers(&film, &im, &e));
         const float *albedo = im.data + image_channel(&im, "albedo.R");
         for (size_t p = 0; p < SIZE * SIZE; p++)
             for (size_t c = 0; c < 3; c++)
                 assert_near(albedo[NUM_LAYERS * p + c], of[i].albedo[c], 1e-6);
-        image_free(&im);
-        film_free(&film);
         drop(&f);
     }
 }
@@ -552,12 +546,11 @@ TEST(normals_as_colours)
         finish(&f, SIZE, SIZE);
         struct render_options o = options_of(1);
         o.integrator.kind = INTEGRATE_NORMALS;
-        struct film film = start(&f, &o, NULL, false);
+        OWN(film) film = start(&f, &o, NULL, false);
         const double colour[3][3] = {{0.8, 0.26, 0.82}, {0.5, 0.5, 1}, {0, 0, 0}};
         for (size_t p = 0; p < SIZE * SIZE; p++)
             for (size_t c = 0; c < 3; c++) /* of the ball within an image of 2 degrees */
                 assert_near(film.m.mean[3 * p + c], colour[what][c], what == 1 ? 0.02 : 1e-6);
-        film_free(&film);
         drop(&f);
     }
 }
@@ -593,7 +586,7 @@ TEST(heatmap_of_one_triangle)
     finish(&f, 8, 4);
     const char *path = test_path("heat.png");
     struct err e = {0};
-    struct image im;
+    OWN(image) im;
     uint64_t most;
     MUST(heatmap_write(path, f.bvh, &f.camera, 1, 0, 7, 4, &most, &e) &&
          image_read(path, &im, NULL, &e));
@@ -602,7 +595,6 @@ TEST(heatmap_of_one_triangle)
     assert_true(most == 1 && im.width == 7 && im.height == 4);
     for (size_t i = 0; i < 3 * 7 * 4; i++)
         assert_true(fabsf(im.data[i] * 255 - top[i % 3]) < 0.01f);
-    image_free(&im);
     unlink(path);
     drop(&f);
 }

@@ -3,6 +3,7 @@
  * more samples of moderate skew the normal limit is good to a factor of two there. Each group has a
  * negative control: a value that a known bug would give must be rejected by the same test. */
 #include "tests/support/render_check.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 static struct integrator_options paths(int direct, int depth)
@@ -15,7 +16,7 @@ static struct integrator_options paths(int direct, int depth)
 TEST(furnace_at_every_depth)
 {
     const double rho[3] = {0.8, 0.5, 0.2}, emitted[3] = {1, 2, 4};
-    struct scene s = build_scene();
+    OWN(scene) s = build_scene();
     uint32_t m = build_material(&s, (rgb){0.8f, 0.5f, 0.2f}, (rgb){1, 2, 4});
     build_sphere(&s, v3(0.1f, -0.2f, 0.3f), 1, -1, m);
     build_camera(&s, v3(0.3f, 0, 0.5f), 60);
@@ -35,7 +36,6 @@ TEST(furnace_at_every_depth)
                     assert_false(check_agrees(&film, c, sum + term));
             }
         }
-    scene_free(&s);
 }
 
 /* Irradiance at the origin, normal +Y, of a polygon of unit radiance above the horizon: Lambert's
@@ -76,7 +76,7 @@ TEST(rectangle_light)
     static const float quads[2][9] = {{0.2f, 1, -0.7f, 0.9f, 0, 0, 0, 0, 0.5f},
                                       {0.3f, 0.05f, 0.5f, 0, 0, -1, 0, 0.8f, 0}};
     for (int q = 0; q < 2; q++) {
-        struct scene s = floor_scene(0.6f);
+        OWN(scene) s = floor_scene(0.6f);
         uint32_t lamp = build_material(&s, grey(0), grey(5));
         const float *f = quads[q];
         vec3 p = v3(f[0], f[1], f[2]), u = v3(f[3], f[4], f[5]), v = v3(f[6], f[7], f[8]);
@@ -101,7 +101,6 @@ TEST(rectangle_light)
                  * mean distance of about 1.1 here; 5 % would already be rejected. */
                 assert_false(check_agrees(&film, 1, 1.05 * expected));
             }
-        scene_free(&s);
     }
 }
 
@@ -111,7 +110,7 @@ TEST(sphere_light)
 {
     static const float centre[3][3] = {{0, 1, 0}, {0.8f, 0.9f, -0.3f}, {0, 0.35f, -0.2f}};
     for (int q = 0; q < 3; q++) {
-        struct scene s = floor_scene(0.5f);
+        OWN(scene) s = floor_scene(0.5f);
         uint32_t lamp = build_material(&s, grey(0), grey(3));
         vec3 c = v3(centre[q][0], centre[q][1], centre[q][2]);
         build_sphere(&s, c, 0.25f, 1, lamp);
@@ -124,14 +123,13 @@ TEST(sphere_light)
             check_mean(&film, 0, expected, direct_kind_names[direct]);
             assert_false(check_agrees(&film, 0, expected / cos_theta * 0.9));
         }
-        scene_free(&s);
     }
 }
 
 /* Point: rho/pi I cos/d^2. Directional: rho/pi E cos. No noise but that of the pixel's width. */
 TEST(delta_lights)
 {
-    struct scene s = floor_scene(0.7f);
+    OWN(scene) s = floor_scene(0.7f);
     build_point(&s, v3(0.6f, 0.8f, -0.5f), (rgb){2, 3, 4});
     vec3 sun = normalize(v3(-1, 2, 0.5f));
     build_sun(&s, sun, (rgb){1, 0, 0.5f});
@@ -145,14 +143,13 @@ TEST(delta_lights)
         check_mean(&film, c, expected, "delta lights");
         assert_false(check_agrees(&film, c, expected * 1.001));
     }
-    scene_free(&s);
 }
 
 /* A plate between light and patch: no light; taken away from the line of sight: all of it. */
 TEST(shadow)
 {
     for (int blocked = 0; blocked < 2; blocked++) {
-        struct scene s = floor_scene(0.7f);
+        OWN(scene) s = floor_scene(0.7f);
         uint32_t black = build_material(&s, grey(0), grey(0));
         build_quad(&s, v3(blocked ? -0.1f : 0.3f, 0.5f, -0.1f), v3(0.2f, 0, 0), v3(0, 0, 0.2f),
                    black);
@@ -160,7 +157,6 @@ TEST(shadow)
         check_finish(&s);
         struct check_result film = check_look(&s, paths(DIRECT_MIS, 1), 4, 16);
         check_mean(&film, 0, blocked ? 0 : 0.7 / M_PI, "shadow");
-        scene_free(&s);
     }
 }
 
@@ -177,7 +173,7 @@ static struct scene box_scene(float radiance)
 TEST(cells_and_sample_ranges_add_up)
 {
     struct err e = {0};
-    struct scene s = box_scene(10);
+    OWN(scene) s = box_scene(10);
     struct camera c;
     MUST(camera_init(&c, &s, 40, 30, &e));
     struct render_options o = {.integrator = paths(DIRECT_MIS, 3),
@@ -185,12 +181,12 @@ TEST(cells_and_sample_ranges_add_up)
                                .height = 30,
                                .num_samples = 6,
                                .threads = 2};
-    struct moments whole = check_render_all(&s, &c, &o, BVH_SAH, NULL);
+    OWN(moments) whole = check_render_all(&s, &c, &o, BVH_SAH, NULL);
     o.num_samples = 2;
-    struct moments first = check_render_all(&s, &c, &o, BVH_SAH, NULL);
+    OWN(moments) first = check_render_all(&s, &c, &o, BVH_SAH, NULL);
     o.first_sample = 2;
     o.num_samples = 4;
-    struct moments rest = check_render_all(&s, &c, &o, BVH_SAH, NULL);
+    OWN(moments) rest = check_render_all(&s, &c, &o, BVH_SAH, NULL);
     MUST(moments_merge(&first, &rest, &e));
     o = (struct render_options){.integrator = o.integrator,
                                 .x = 7,
@@ -199,7 +195,7 @@ TEST(cells_and_sample_ranges_add_up)
                                 .height = 13,
                                 .num_samples = 6,
                                 .threads = 1};
-    struct moments cell = check_render_all(&s, &c, &o, BVH_SAH, NULL);
+    OWN(moments) cell = check_render_all(&s, &c, &o, BVH_SAH, NULL);
     for (int y = 0; y < 13; y++)
         assert_memory_equal(cell.mean + 3 * (size_t)y * 21,
                             whole.mean + 3 * ((size_t)(y + 11) * 40 + 7), 21 * 3 * sizeof(double));
@@ -207,46 +203,36 @@ TEST(cells_and_sample_ranges_add_up)
         assert_true(fabs(first.mean[i] - whole.mean[i]) <= 1e-12 * (1 + fabs(whole.mean[i])));
         assert_true(fabs(first.m2[i] - whole.m2[i]) <= 1e-10 * (1 + fabs(whole.m2[i])));
     }
-    moments_free(&whole);
-    moments_free(&cell);
-    moments_free(&first);
-    moments_free(&rest);
-    scene_free(&s);
 }
 
 /* Bounces 0..4 rendered one by one add up to the image that accumulates them: the same random
  * numbers, so up to float rounding and not only in the mean. */
 TEST(bounces_add_up)
 {
-    struct scene s = box_scene(10);
+    OWN(scene) s = box_scene(10);
     for (int direct = 0; direct_kind_names[direct] != NULL; direct++) {
         struct integrator_options io = paths(direct, 4);
-        struct moments all = check_render(&s, io, 16, 12, 16);
+        OWN(moments) all = check_render(&s, io, 16, 12, 16);
         double sum[16 * 12 * 3] = {0};
         for (int k = 0; k <= 4; k++) {
             io.first_bounce = io.max_bounces = k;
-            struct moments only = check_render(&s, io, 16, 12, 16);
+            OWN(moments) only = check_render(&s, io, 16, 12, 16);
             for (size_t i = 0; i < 16 * 12 * 3; i++)
                 sum[i] += only.mean[i];
-            moments_free(&only);
         }
         for (size_t i = 0; i < 16 * 12 * 3; i++)
             assert_true(fabs(sum[i] - all.mean[i]) <= 1e-5 * (0.01 + all.mean[i]));
-        moments_free(&all);
     }
-    scene_free(&s);
 }
 
 TEST(twice_the_light_twice_the_image)
 {
     struct integrator_options io = paths(DIRECT_MIS, 4);
     struct scene one = box_scene(5), two = box_scene(10);
-    struct moments a = check_render(&one, io, 16, 12, 16);
-    struct moments b = check_render(&two, io, 16, 12, 16);
+    OWN(moments) a = check_render(&one, io, 16, 12, 16);
+    OWN(moments) b = check_render(&two, io, 16, 12, 16);
     for (size_t i = 0; i < 16 * 12 * 3; i++)
         assert_true(b.mean[i] == 2 * a.mean[i]);
-    moments_free(&a);
-    moments_free(&b);
     scene_free(&one);
     scene_free(&two);
 }
@@ -255,27 +241,23 @@ TEST(twice_the_light_twice_the_image)
  * 64 samples: relative standard error about 0.3 % (light, mis), so a loss of 3 % is found. */
 TEST(estimators_agree)
 {
-    struct scene s = box_scene(10);
+    OWN(scene) s = box_scene(10);
     struct integrator_options io = paths(DIRECT_MIS, 4);
     io.roulette = ROULETTE_OFF;
-    struct moments reference = check_render(&s, io, 64, 48, 64);
+    OWN(moments) reference = check_render(&s, io, 64, 48, 64);
     for (int direct = 0; direct_kind_names[direct] != NULL; direct++)
         for (int roulette = ROULETTE_OFF; roulette <= ROULETTE_FIXED; roulette++) {
             io.sampler.seed++;
             io.direct = (enum direct_kind)direct;
             io.roulette = (enum roulette_kind)roulette;
             io.survival = 0.7f;
-            struct moments film = check_render(&s, io, 64, 48, 64);
+            OWN(moments) film = check_render(&s, io, 64, 48, 64);
             double z = check_z(&film, &reference, 0);
             if (fabs(z) > CHECK_Z_LIMIT)
                 fail_msg("%s, roulette %d: z = %.2f", direct_kind_names[direct], roulette, z);
-            moments_free(&film);
         }
     /* Negative control: one bounce less. */
     io.max_bounces = 3;
-    struct moments shallow = check_render(&s, io, 64, 48, 256);
+    OWN(moments) shallow = check_render(&s, io, 64, 48, 256);
     assert_true(fabs(check_z(&shallow, &reference, 0)) > CHECK_Z_LIMIT);
-    moments_free(&shallow);
-    moments_free(&reference);
-    scene_free(&s);
 }

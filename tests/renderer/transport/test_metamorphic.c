@@ -5,6 +5,7 @@
  * seed each, fixed n, no retry. With 1024 samples of 24 x 18 pixels the standard error of each
  * difference is below 1.5 % (checked), so that a quarter off by 10 % is found with 96 %. */
 #include "tests/support/render_check.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 enum { WIDTH = 24, HEIGHT = 18, SPP = 1024, NUM_VALUES = 3 * WIDTH * HEIGHT };
@@ -162,7 +163,7 @@ static double worst_z(const struct moments *a, const struct moments *b)
 TEST(rigid_motion_and_scale)
 {
     struct scene s = build(&original);
-    struct moments still = look(&s, 0);
+    OWN(moments) still = look(&s, 0);
     static const float sizes[] = {1, 37.5f, 0.004f};
     for (size_t i = 0; i < 3; i++)
         for (int mirrored = 0; mirrored < 2; mirrored++) {
@@ -171,13 +172,12 @@ TEST(rigid_motion_and_scale)
             move(&s, sizes[i], mirrored);
             if (mirrored)
                 s.camera.right = neg(s.camera.right);
-            struct moments m = look(&s, 1 + 2 * i + (uint64_t)mirrored);
+            OWN(moments) m = look(&s, 1 + 2 * i + (uint64_t)mirrored);
             if (mirrored)
                 flip(&m);
             double z = worst_z(&still, &m);
             if (z > CHECK_Z_LIMIT)
                 fail_msg("size %g, mirrored %d: z = %.2f", (double)sizes[i], mirrored, z);
-            moments_free(&m);
         }
     /* Negative controls: intensities that do not grow with the size; a light left behind. */
     s = build(&original);
@@ -192,7 +192,6 @@ TEST(rigid_motion_and_scale)
     m = look(&s, 12);
     assert_true(worst_z(&still, &m) > CHECK_Z_LIMIT);
     moments_free(&m);
-    moments_free(&still);
 }
 
 /* The channels know nothing of each other but in how far a path goes on, which is symmetric, and in
@@ -201,12 +200,12 @@ TEST(channels_permute)
 {
     static const int permutations[][3] = {{1, 2, 0}, {2, 1, 0}, {0, 2, 1}};
     struct scene s = build(&original);
-    struct moments plain = look(&s, 0);
+    OWN(moments) plain = look(&s, 0);
     for (size_t k = 0; k < 3; k++) {
         const int *to = permutations[k];
         const struct variant v = {ALL, {to[0], to[1], to[2]}};
         s = build(&v);
-        struct moments m = look(&s, 0);
+        OWN(moments) m = look(&s, 0);
         bool all_equal = true;
         for (size_t p = 0; p < WIDTH * HEIGHT; p++)
             for (int c = 0; c < 3; c++) {
@@ -215,9 +214,7 @@ TEST(channels_permute)
                 all_equal &= m.mean[3 * p + (size_t)c] == plain.mean[3 * p + (size_t)c];
             }
         assert_false(all_equal);
-        moments_free(&m);
     }
-    moments_free(&plain);
 }
 
 /* The image by all lights is the sum of the images by each. */

@@ -11,6 +11,7 @@
 #include "tests/support/build_scene.h"
 #include "tests/support/malloc_below.h"
 #include "tests/support/mesh.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #include <pthread.h>
@@ -258,7 +259,7 @@ static bool draw(const void *arg, double *digest, struct err *e)
     static const struct render_id id = {.scene = "abc", .settings = "path", .adaptive = "off"};
     struct film f = {0}, back = {0};
     struct image layers = {0}, read_again = {0};
-    struct moments m = {0};
+    OWN(moments) m = {0};
     struct render_stats stats;
     struct progress p;
     const char *exr = test_path("m.exr"), *state = test_path("m.state");
@@ -272,7 +273,6 @@ static bool draw(const void *arg, double *digest, struct err *e)
               checkpoint_read(state, &id, &back, e) && film_merge(&back, &f, 0, 20 * 18, e);
     for (size_t i = 0; ok && i < 20 * 18; i++)
         *digest += (m.mean[3 * i] + back.m.m2[3 * i + 1] + m.n[i] + back.m.n[i]) * (double)(i + 1);
-    moments_free(&m);
     image_free(&layers);
     image_free(&read_again);
     film_free(&f);
@@ -283,7 +283,7 @@ static bool draw(const void *arg, double *digest, struct err *e)
 TEST(renders)
 {
     struct err e = {0};
-    struct scene s = build_room(9);
+    OWN(scene) s = build_room(9);
     struct camera c = build_finish(&s, 20, 18);
     struct bvh *bvh = bvh_build(&s, BVH_WIDE, &e);
     MUST(bvh != NULL);
@@ -293,5 +293,4 @@ TEST(renders)
     try_all("adaptive", draw, &(struct job){&s, &c, bvh, true, 1, 4, 0}, 10);
     try_all("after a pilot", draw, &(struct job){&s, &c, bvh, false, 2, 0, 4}, 10);
     bvh_free(bvh);
-    scene_free(&s);
 }

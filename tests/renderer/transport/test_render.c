@@ -1,5 +1,6 @@
 /* Whole images: the samplers agree, threads change nothing, and the counts are right. */
 #include "tests/support/render_check.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 enum { WIDTH = 40, HEIGHT = 30 };
@@ -44,42 +45,37 @@ static bool same_bits(const struct moments *a, const struct moments *b)
  * once whoever does it, so the sums over threads have to be those of one thread, to the last ray. */
 TEST(threads_change_nothing)
 {
-    struct scene s = room();
+    OWN(scene) s = room();
     for (int sampler = SAMPLER_INDEPENDENT; sampler <= SAMPLER_SOBOL; sampler++)
         for (int accel = BVH_BRUTE_FORCE; accel <= BVH_WIDE; accel++) {
             struct how how = {{(enum sampler_kind)sampler, 3}, (enum bvh_kind)accel, 4, 4, 1};
             struct render_stats one, many;
-            struct moments a = image(&s, how, &one);
+            OWN(moments) a = image(&s, how, &one);
             for (how.threads = 2; how.threads <= 7; how.threads += 5) {
-                struct moments b = image(&s, how, &many);
+                OWN(moments) b = image(&s, how, &many);
                 assert_true(same_bits(&a, &b));
                 assert_true(one.rays.rays == many.rays.rays);
                 assert_true(one.rays.box_tests == many.rays.box_tests);
                 assert_true(one.rays.primitive_tests == many.rays.primitive_tests);
                 assert_true(one.samples == many.samples);
-                moments_free(&b);
             }
             /* Negative control: another seed is another image with other counts. */
             how.sampler.seed++;
-            struct moments b = image(&s, how, &many);
+            OWN(moments) b = image(&s, how, &many);
             assert_false(same_bits(&a, &b));
             assert_true(one.rays.rays != many.rays.rays);
-            moments_free(&a);
-            moments_free(&b);
         }
-    scene_free(&s);
 }
 
 /* What can be counted by hand: with no bounce there is one ray per path, and brute force tests each
  * of the primitives (11: ten triangles and a ball) for each. A hierarchy tests the root for all. */
 TEST(counts_are_right)
 {
-    struct scene s = room();
+    OWN(scene) s = room();
     struct render_stats stats;
     for (int accel = BVH_BRUTE_FORCE; accel <= BVH_SAH; accel++) {
         struct how how = {{SAMPLER_INDEPENDENT, 3}, (enum bvh_kind)accel, 0, 3, 2};
-        struct moments m = image(&s, how, &stats);
-        moments_free(&m);
+        OWN(moments) m = image(&s, how, &stats);
         assert_true(stats.rays.rays == WIDTH * HEIGHT * 3);
         assert_true(stats.samples == WIDTH * HEIGHT * 3);
         if (accel == BVH_BRUTE_FORCE) {
@@ -90,7 +86,6 @@ TEST(counts_are_right)
             assert_true(stats.rays.box_tests >= stats.rays.rays);
         }
     }
-    scene_free(&s);
 }
 
 /* Mean over the image of each of `count` replicates with seeds of their own; their mean and its
@@ -101,11 +96,10 @@ static void replicates(const struct scene *s, struct how how, int count, double 
     *mean = 0;
     for (int k = 0; k < count; k++) {
         how.sampler.seed++;
-        struct moments m = image(s, how, NULL);
+        OWN(moments) m = image(s, how, NULL);
         double sum = 0;
         for (size_t i = 0; i < WIDTH * HEIGHT * 3; i++)
             sum += m.mean[i] / (WIDTH * HEIGHT * 3);
-        moments_free(&m);
         double d = sum - *mean;
         *mean += d / (k + 1);
         m2 += d * (sum - *mean);
@@ -118,7 +112,7 @@ static void replicates(const struct scene *s, struct how how, int count, double 
  * seeds. The relative standard error is about 0.25 %, so 2 % is found with certainty. */
 TEST(samplers_agree)
 {
-    struct scene s = room();
+    OWN(scene) s = room();
     struct how how = {{SAMPLER_INDEPENDENT, 100}, BVH_SAH, 3, 16, 2};
     double mean[3], var[3];
     replicates(&s, how, 32, &mean[0], &var[0]);
@@ -132,20 +126,17 @@ TEST(samplers_agree)
     how.bounces--;
     replicates(&s, how, 32, &mean[2], &var[2]);
     assert_true(fabs((mean[2] - mean[0]) / sqrt(var[0] + var[2])) > 6.2);
-    scene_free(&s);
 }
 
 /* Sum over pixels of the variance between two images with different seeds. */
 static double noise(const struct scene *s, struct how how)
 {
-    struct moments a = image(s, how, NULL);
+    OWN(moments) a = image(s, how, NULL);
     how.sampler.seed += 50;
-    struct moments b = image(s, how, NULL);
+    OWN(moments) b = image(s, how, NULL);
     double sum = 0;
     for (size_t i = 0; i < WIDTH * HEIGHT * 3; i++)
         sum += (a.mean[i] - b.mean[i]) * (a.mean[i] - b.mean[i]) / 2;
-    moments_free(&a);
-    moments_free(&b);
     return sum;
 }
 
@@ -155,7 +146,7 @@ static double noise(const struct scene *s, struct how how)
  * that their M2 is no error. */
 TEST(sobol_has_less_noise)
 {
-    struct scene s = room();
+    OWN(scene) s = room();
     struct how how = {{SAMPLER_INDEPENDENT, 1}, BVH_SAH, 1, 64, 2};
     double independent = noise(&s, how);
     how.sampler.seed = 2;
@@ -174,5 +165,4 @@ TEST(sobol_has_less_noise)
     assert_string_equal(m.unit, "sample");
     assert_false(isnan(moments_var_of_mean(&m, 0, 0)));
     moments_free(&m);
-    scene_free(&s);
 }

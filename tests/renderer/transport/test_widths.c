@@ -4,6 +4,7 @@
 #include "renderer/math/trig.h"
 #include "tests/support/render_check.h"
 #include "tests/support/sky.h"
+#include "tests/support/own.h"
 #include "tests/support/test.h"
 
 /* Not a multiple of a tile, nor of eight. */
@@ -198,22 +199,19 @@ static void compare(const struct scene *s, struct how how)
     enum isa isa[MAX_ISAS];
     int n = machine_isas(isa);
     how.opt.isa = ISA_SCALAR;
-    struct moments scalar = image_of(s, &how);
+    OWN(moments) scalar = image_of(s, &how);
     assert_true(brightness(&scalar) > 0);
     for (int i = 0; i < n; i++) {
         how.opt.isa = isa[i];
-        struct moments m = image_of(s, &how);
+        OWN(moments) m = image_of(s, &how);
         if (!same(&scalar, &m))
             fail_msg("%s differs: direct %s, %d light samples, %s", isa_names[isa[i]],
                      direct_kind_names[how.opt.direct], how.opt.light_samples,
                      sampler_kind_names[how.opt.sampler.kind]);
-        moments_free(&m);
     }
     how.opt.sampler.seed++;
-    struct moments other = image_of(s, &how);
+    OWN(moments) other = image_of(s, &how);
     assert_false(same(&scalar, &other));
-    moments_free(&other);
-    moments_free(&scalar);
 }
 
 static void complete(struct scene *s, bool image)
@@ -231,7 +229,7 @@ TEST(bits_are_those_of_one_lane)
 {
     struct scene (*const make[])(void) = {all_kinds, many_lamps, mesh_lamp, textured};
     for (int which = 0; which < 8; which++) {
-        struct scene s = make[which / 2]();
+        OWN(scene) s = make[which / 2]();
         complete(&s, which % 2);
         for (int direct = DIRECT_HEMISPHERE; direct <= DIRECT_MIS; direct++)
             for (int sampler = SAMPLER_INDEPENDENT; sampler <= SAMPLER_SOBOL; sampler++) {
@@ -250,14 +248,13 @@ TEST(bits_are_those_of_one_lane)
                     .threads = 1};
                 compare(&s, how);
             }
-        scene_free(&s);
     }
 }
 
 /* Depths at which paths end in every way, and rows of fewer than eight. */
 TEST(depths_and_threads_do_not_matter)
 {
-    struct scene s = all_kinds();
+    OWN(scene) s = all_kinds();
     complete(&s, true);
     for (int bounces = 0; bounces < 9; bounces += 1 + bounces / 2) {
         struct how how = {.opt = {.direct = bounces % 2 ? DIRECT_LIGHT : DIRECT_MIS,
@@ -269,13 +266,12 @@ TEST(depths_and_threads_do_not_matter)
                           .threads = 1 + bounces % 3};
         compare(&s, how);
     }
-    scene_free(&s);
 }
 
 /* More shadow rays than paths, in a batch that never was full: a thread's first tile, at the image's edge. */
 TEST(small_images_with_several_light_samples)
 {
-    struct scene s = all_kinds();
+    OWN(scene) s = all_kinds();
     complete(&s, false);
     for (int lights = 2; lights <= 9; lights++)
         compare(&s, (struct how){.opt = {.direct = DIRECT_MIS,
@@ -286,7 +282,6 @@ TEST(small_images_with_several_light_samples)
                                  .threads = 1,
                                  .width = 2 * lights - 1,
                                  .height = 8});
-    scene_free(&s);
 }
 
 /* What the starter code does wrong, to rectangles, to a lamp of many triangles and to rough metals. */
@@ -294,7 +289,7 @@ TEST(defects_of_the_starter_code)
 {
     struct scene (*const make[])(void) = {all_kinds, mesh_lamp};
     for (int which = 0; which < 2; which++) {
-        struct scene s = make[which]();
+        OWN(scene) s = make[which]();
         complete(&s, false);
         cs184_deviations_apply(&s, (1u << NUM_CS184_DEVIATIONS) - 1);
         compare(&s, (struct how){.opt = {.direct = DIRECT_LIGHT,
@@ -303,7 +298,6 @@ TEST(defects_of_the_starter_code)
                                          .sampler = {SAMPLER_INDEPENDENT, 3}},
                                  .spp = 2,
                                  .threads = 1});
-        scene_free(&s);
     }
 }
 
@@ -312,14 +306,13 @@ TEST(normals_too)
 {
     struct scene (*const make[])(void) = {all_kinds, many_lamps, mesh_lamp};
     for (int which = 0; which < 3; which++) {
-        struct scene s = make[which]();
+        OWN(scene) s = make[which]();
         complete(&s, false);
         compare(&s, (struct how){
                         .opt = {.kind = INTEGRATE_NORMALS, .sampler = {SAMPLER_INDEPENDENT, 9}},
                         .lens = 0.1f,
                         .spp = 2,
                         .threads = 2});
-        scene_free(&s);
     }
 }
 
