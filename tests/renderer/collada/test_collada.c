@@ -15,17 +15,20 @@
 #include "tests/support/test.h"
 
 #include <ctype.h>
+#include <stdarg.h>
 
-/* i: the number in the key. */
-static void put(FILE *f, const char *key, uint32_t i, vec3 v)
+__attribute__((format(printf, 3, 4))) static void put(FILE *f, vec3 v, const char *key, ...)
 {
-    fprintf(f, key, i); // NOLINT(clang-diagnostic-format-nonliteral)
+    va_list number;
+    va_start(number, key);
+    vfprintf(f, key, number);
+    va_end(number);
     fprintf(f, " %.9g %.9g %.9g\n", (double)v.x, (double)v.y, (double)v.z);
 }
 
-static void put_rgb(FILE *f, const char *key, uint32_t i, rgb c)
+static vec3 of_rgb(rgb c)
 {
-    put(f, key, i, v3(c.r, c.g, c.b));
+    return v3(c.r, c.g, c.b);
 }
 
 static const vec3 *corners(const struct scene *s, uint32_t triangle)
@@ -47,13 +50,13 @@ static void put_triangles(FILE *f, const struct scene *s)
         const vec3 *p = corners(s, i), n = front(p);
         area += 0.5 * length(n);
         notch += p[0].x + p[1].x + p[2].x > 3 && p[0].y + p[1].y + p[2].y > 3;
-        put(f, "t%u.front", i, normalize(n));
+        put(f, normalize(n), "t%u.front", i);
         fprintf(f, "t%u.object %s\nt%u.material %s\nt%u.light %d\n", i,
                 s->objects[s->tri_object[i]].name, i, s->materials[s->tri_material[i]].name, i,
                 s->tri_light[i]);
         for (uint32_t k = 3 * i; k < 3 * i + 3; k++) {
-            put(f, "p%u", k, s->position[k]);
-            put(f, "n%u", k, s->normal[k]);
+            put(f, s->position[k], "p%u", k);
+            put(f, s->normal[k], "n%u", k);
         }
     }
     fprintf(f, "area %.9g\nnotch %d\n", area, notch);
@@ -88,19 +91,19 @@ static void put_lights(FILE *f, const struct scene *s)
             f, "l%u.kind %s\nl%u.cos_cutoff %.9g\nl%u.exponent %.9g\nl%u.area %.9g\nl%u.count %u\n",
             i, kind[l->kind], i, (double)l->cos_cutoff, i, (double)l->exponent, i, (double)l->area,
             i, l->count);
-        put_rgb(f, "l%u.value", i, l->value);
-        put(f, "l%u.position", i, l->position);
-        put(f, "l%u.axis", i, l->axis);
-        put(f, "l%u.to_light", i, l->to_light);
-        put(f, "l%u.attenuation", i, v3(l->attenuation[0], l->attenuation[1], l->attenuation[2]));
+        put(f, of_rgb(l->value), "l%u.value", i);
+        put(f, l->position, "l%u.position", i);
+        put(f, l->axis, "l%u.axis", i);
+        put(f, l->to_light, "l%u.to_light", i);
+        put(f, v3(l->attenuation[0], l->attenuation[1], l->attenuation[2]), "l%u.attenuation", i);
         fprintf(f, "l%u.corners", i);
         if (l->kind == LIGHT_TRIANGLES)
             put_corners(f, s, l);
         fputc('\n', f);
     }
     if (s->environment != NULL) {
-        put_rgb(f, "sky.above", 0, environment_radiance(s->environment, v3(0, 1, 0)));
-        put_rgb(f, "sky.below", 0, environment_radiance(s->environment, v3(0, -1, 0)));
+        put(f, of_rgb(environment_radiance(s->environment, v3(0, 1, 0))), "sky.above");
+        put(f, of_rgb(environment_radiance(s->environment, v3(0, -1, 0))), "sky.below");
         fprintf(f, "sky.hidden %d\nsky.light %d\n", environment_is_hidden(s->environment),
                 s->environment_light);
     }
@@ -120,13 +123,13 @@ static void put_materials(FILE *f, const struct scene *s)
         fprintf(f, "m%u.microfacet %s %s %s\n", i,
                 m->microfacet == MICROFACET_GGX ? "ggx" : "beckmann",
                 m->separable ? "separable" : "correlated", m->conductor ? "conductor" : "constant");
-        put_rgb(f, "m%u.reflectance", i, m->reflectance);
-        put_rgb(f, "m%u.transmittance", i, m->transmittance);
-        put_rgb(f, "m%u.radiance", i, m->radiance);
-        put_rgb(f, "m%u.eta", i, m->eta);
-        put_rgb(f, "m%u.k", i, m->k);
-        put_rgb(f, "m%u.specular", i, m->specular);
-        put_rgb(f, "m%u.mirror", i, m->mirror);
+        put(f, of_rgb(m->reflectance), "m%u.reflectance", i);
+        put(f, of_rgb(m->transmittance), "m%u.transmittance", i);
+        put(f, of_rgb(m->radiance), "m%u.radiance", i);
+        put(f, of_rgb(m->eta), "m%u.eta", i);
+        put(f, of_rgb(m->k), "m%u.k", i);
+        put(f, of_rgb(m->specular), "m%u.specular", i);
+        put(f, of_rgb(m->mirror), "m%u.mirror", i);
     }
 }
 
@@ -150,14 +153,14 @@ static char *dump(const struct scene *s)
     for (uint32_t i = 0; i < s->num_cameras; i++)
         fprintf(f, " %s", s->cameras[i].name);
     fputc('\n', f);
-    put(f, "right", 0, c->right);
-    put(f, "up", 0, c->up);
-    put(f, "backward", 0, c->backward);
-    put(f, "eye", 0, c->eye);
-    put(f, "bounds_min", 0, s->bounds_min);
-    put(f, "bounds_max", 0, s->bounds_max);
-    put(f, "frame_min", 0, s->frame_min);
-    put(f, "frame_max", 0, s->frame_max);
+    put(f, c->right, "right");
+    put(f, c->up, "up");
+    put(f, c->backward, "backward");
+    put(f, c->eye, "eye");
+    put(f, s->bounds_min, "bounds_min");
+    put(f, s->bounds_max, "bounds_max");
+    put(f, s->frame_min, "frame_min");
+    put(f, s->frame_max, "frame_max");
     for (uint32_t i = 0; i < s->num_objects; i++)
         fprintf(f, "o%u.name %s\no%u.material %u\no%u.triangles %u %u\no%u.spheres %u %u\n", i,
                 s->objects[i].name, i, s->objects[i].material, i, s->objects[i].first_triangle,
@@ -167,7 +170,7 @@ static char *dump(const struct scene *s)
         const struct sphere *b = &s->spheres[i];
         fprintf(f, "s%u.radius %.9g\ns%u.normal_out %.9g\n", i, (double)b->radius, i,
                 (double)b->normal_out);
-        put(f, "s%u.centre", i, b->centre);
+        put(f, b->centre, "s%u.centre", i);
     }
     put_triangles(f, s);
     put_lights(f, s);
