@@ -75,7 +75,8 @@ TEST(counts_are_right)
     struct render_stats stats;
     for (int accel = BVH_BRUTE_FORCE; accel <= BVH_SAH; accel++) {
         struct how how = {{SAMPLER_INDEPENDENT, 3}, (enum bvh_kind)accel, 0, 3, 2};
-        OWN(moments) m = image(&s, how, &stats);
+        struct moments m = image(&s, how, &stats);
+        moments_free(&m);
         assert_true(stats.rays.rays == WIDTH * HEIGHT * 3);
         assert_true(stats.samples == WIDTH * HEIGHT * 3);
         if (accel == BVH_BRUTE_FORCE) {
