@@ -66,14 +66,17 @@ struct second {
 
 static struct second second_difference(const struct submitted_image *of, int x, int y, size_t c)
 {
-    static const double kernel[3] = {1, -2, 1};
+    static const double kernel[9] = {1 / 6.,  -2 / 6., 1 / 6.,  -2 / 6., 4 / 6.,
+                                     -2 / 6., 1 / 6.,  -2 / 6., 1 / 6.};
     struct second s = {0};
-    for (int k = 0; k < 9; k++) {
-        size_t i = 3 * ((size_t)(y - 1 + k / 3) * (size_t)of->width + (size_t)(x - 1 + k % 3)) + c;
-        double w = kernel[k / 3] * kernel[k % 3] / 6;
-        s.value += w * of->mean[i];
-        s.variance += w * w * of->variance[i];
-        s.rounding += w * w * of->rounding[i];
+    const double *w = kernel;
+    for (int j = y - 1; j <= y + 1; j++) {
+        size_t i = 3 * ((size_t)j * (size_t)of->width + (size_t)(x - 1)) + c;
+        for (int k = 0; k < 3; k++, w++, i += 3) {
+            s.value += *w * of->mean[i];
+            s.variance += *w * *w * of->variance[i];
+            s.rounding += *w * *w * of->rounding[i];
+        }
     }
     return s;
 }
