@@ -8,11 +8,19 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-static char path[64], dir[80], in_dir[112];
+enum { SUFFIXES = 2 };
+
+/* A file stays open: opening it takes longer than what is done with a small one. */
+static struct {
+    char path[64];
+    int f;
+} files[SUFFIXES];
+static char dir[80], in_dir[112];
 
 static void remove_files(void)
 {
-    unlink(path);
+    for (int i = 0; i < SUFFIXES; i++)
+        unlink(files[i].path);
     if (dir[0] != '\0') {
         unlink(in_dir);
         rmdir(dir);
@@ -45,16 +53,22 @@ void __cyg_profile_func_exit(void *function, void *caller)
 
 const char *fuzz_file(const uint8_t *data, size_t size, const char *suffix)
 {
-    static int f; /* stays open: opening it takes longer than what is done with a small file */
-    if (path[0] == '\0') {
-        snprintf(path, sizeof path, "/dev/shm/assay_fuzz_%d%s", (int)getpid(), suffix);
-        atexit(remove_files);
-        f = creat(path, 0600);
+    char path[64];
+    int i = 0;
+    snprintf(path, sizeof path, "/dev/shm/assay_fuzz_%d%s", (int)getpid(), suffix);
+    while (i < SUFFIXES && files[i].path[0] != '\0' && strcmp(files[i].path, path) != 0)
+        i++;
+    fuzz_require(i < SUFFIXES, "more suffixes than there is room for");
+    if (files[i].path[0] == '\0') {
+        if (i == 0)
+            atexit(remove_files);
+        strcpy(files[i].path, path);
+        files[i].f = creat(path, 0600);
     }
-    fuzz_require(f >= 0 && pwrite(f, data, size, 0) == (ssize_t)size &&
-                     ftruncate(f, (off_t)size) == 0,
+    fuzz_require(files[i].f >= 0 && pwrite(files[i].f, data, size, 0) == (ssize_t)size &&
+                     ftruncate(files[i].f, (off_t)size) == 0,
                  "cannot write to /dev/shm");
-    return path;
+    return files[i].path;
 }
 
 const char *fuzz_dir(const char *file, const char *name)

@@ -10,7 +10,8 @@
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
-/* A file in memory with these bytes, its name ending in `suffix`; the same name at every call of a process. */
+/* A file in memory with these bytes, its name ending in `suffix`; the same name at every call of a process with
+ * that suffix. Room for two of them. */
 const char *fuzz_file(const uint8_t *data, size_t size, const char *suffix);
 
 /* A directory in which the file of fuzz_file() is called `name`. */

@@ -39,24 +39,6 @@ void html_name(FILE *f, const char *s)
     }
 }
 
-/* One conversion, specifier included, of the value that comes next. */
-static void print_value(FILE *f, const char *conversion, size_t length, va_list *values)
-{
-    char type = conversion[length - 1], size = conversion[length - 2];
-    char format[24];
-    assert(length < sizeof format && (type != 's' || length == 2));
-    snprintf(format, sizeof format, "%.*s", (int)length, conversion);
-    if (type == 's')
-        html_text(f, va_arg(*values, const char *));
-    else if (strchr("aefg", type) != NULL)
-        fprintf(f, format, va_arg(*values, double));
-    else
-        fprintf(f, "%lld",
-                size == 'z'   ? (long long)va_arg(*values, size_t)
-                : size == 'l' ? va_arg(*values, long long)
-                              : va_arg(*values, int));
-}
-
 void html_vprint(FILE *f, const char *format, va_list values)
 {
     va_list next;
@@ -67,11 +49,22 @@ void html_vprint(FILE *f, const char *format, va_list values)
         format += plain;
         if (*format == '\0')
             break;
+        char one[24]; /* conversion, specifier included */
         size_t length = 2 + strspn(format + 1, "+-0123456789.zl");
-        if (format[1] == '%')
+        char type = format[length - 1], size = format[length - 2];
+        assert(length < sizeof one && (type != 's' || length == 2));
+        snprintf(one, sizeof one, "%.*s", (int)length, format);
+        if (type == '%')
             fputc('%', f);
+        else if (type == 's')
+            html_text(f, va_arg(next, const char *));
+        else if (strchr("aefg", type) != NULL)
+            fprintf(f, one, va_arg(next, double));
         else
-            print_value(f, format, length, &next);
+            fprintf(f, "%lld",
+                    size == 'z'   ? (long long)va_arg(next, size_t)
+                    : size == 'l' ? va_arg(next, long long)
+                                  : va_arg(next, int));
         format += length;
     }
     va_end(next);

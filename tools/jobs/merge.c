@@ -215,7 +215,7 @@ static bool join_ranges(const struct share *share, int first, int last, struct s
     int most = 0;
     for (int i = first; i < last; i++)
         most += share[i].num_ranges;
-    out->range = calloc((size_t)most, sizeof *out->range);
+    out->range = calloc((size_t)most + 1, sizeof *out->range);
     if (out->range == NULL)
         return err_set(e, "out of memory");
     for (int i = first; i < last; i++)
