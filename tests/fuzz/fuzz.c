@@ -56,9 +56,10 @@ const char *fuzz_file(const uint8_t *data, size_t size, const char *suffix)
     char path[64];
     int i = 0;
     snprintf(path, sizeof path, "/dev/shm/assay_fuzz_%d%s", (int)getpid(), suffix);
-    while (i < SUFFIXES && files[i].path[0] != '\0' && strcmp(files[i].path, path) != 0)
+    while (i < SUFFIXES - 1 && files[i].path[0] != '\0' && strcmp(files[i].path, path) != 0)
         i++;
-    fuzz_require(i < SUFFIXES, "more suffixes than there is room for");
+    fuzz_require(files[i].path[0] == '\0' || strcmp(files[i].path, path) == 0,
+                 "more suffixes than there is room for");
     if (files[i].path[0] == '\0') {
         if (i == 0)
             atexit(remove_files);
