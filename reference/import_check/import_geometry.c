@@ -227,6 +227,15 @@ bool import_geometry_read_point(const json_t *array, size_t at, point *out)
     return true;
 }
 
+/* In our axes. */
+static bool read_turned(const struct check *c, const json_t *array, size_t at, point *out)
+{
+    if (!import_geometry_read_point(array, at, out))
+        return false;
+    *out = import_geometry_point(c->pair, *out);
+    return true;
+}
+
 static bool check_mesh(struct check *c, const json_t *mesh, struct err *e)
 {
     const json_t *sizes = json_object_get(mesh, "sizes"),
@@ -236,8 +245,8 @@ static bool check_mesh(struct check *c, const json_t *mesh, struct err *e)
     const char *name = json_string_value(json_object_get(mesh, "name"));
     if (name == NULL || !json_is_array(sizes) || !json_is_array(corners))
         return err_set(e, "blender_import.py: a mesh without its members");
-    point *places = calloc(LARGEST_POLYGON, sizeof *places);
-    point *directions = calloc(LARGEST_POLYGON, sizeof *directions);
+    point *places = malloc(LARGEST_POLYGON * sizeof *places);
+    point *directions = malloc(LARGEST_POLYGON * sizeof *directions);
     uint32_t *vertex = malloc(LARGEST_POLYGON * sizeof *vertex);
     bool ok = (places != NULL && directions != NULL && vertex != NULL) ||
               err_set(e, "import check: out of memory");
@@ -245,13 +254,9 @@ static bool check_mesh(struct check *c, const json_t *mesh, struct err *e)
     for (size_t i = 0; ok && i < json_array_size(sizes); i++) {
         json_int_t n = json_integer_value(json_array_get(sizes, i));
         ok = n >= 3 && n <= LARGEST_POLYGON;
-        for (size_t k = 0; ok && k < (size_t)n; k++, at += 3) {
-            ok = import_geometry_read_point(corners, at, &places[k]) &&
-                 (!json_is_array(normals) ||
-                  import_geometry_read_point(normals, at, &directions[k]));
-            places[k] = import_geometry_point(c->pair, places[k]);
-            directions[k] = import_geometry_point(c->pair, directions[k]);
-        }
+        for (size_t k = 0; ok && k < (size_t)n; k++, at += 3)
+            ok = read_turned(c, corners, at, &places[k]) &&
+                 (!json_is_array(normals) || read_turned(c, normals, at, &directions[k]));
         if (!ok) {
             err_set(e, "blender_import.py: mesh '%s', polygon %zu: not numbers", name, i);
             break;

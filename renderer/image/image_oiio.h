@@ -8,7 +8,8 @@
 #include "renderer/base/fs.h"
 
 /* Reads OpenEXR, Radiance, PNG, PFM and PNM, told by their first bytes. Integer formats come scaled to [0,1], no
- * colour conversion. Of OpenEXR it is the data window; PNG's texts of more than 256 KiB are left out. Refuses, unread, what is larger than the limits of image.h. *half (may be NULL) tells if the file stored fewer than 32 bits per channel. */
+ * colour conversion. Of OpenEXR it is the data window; PNG's texts of more than 256 KiB are left out. Refuses, unread, what is
+ * larger than the limits of image.h. *half (may be NULL) tells if the file stored fewer than 32 bits per channel. */
 NODISCARD bool image_read(const char *path, struct image *out, bool *half, struct err *e);
 
 /* Reads the colours of an OpenEXR, PNG, JPEG, Radiance or (by its name's ending) Targa file as channels R, G and B of

@@ -18,7 +18,8 @@ INLINE vf exp_negative(vf x)
     return vf_select(vf_lt(x, least), vf_set(0), p * as_vf((n + 127) << 23));
 }
 
-/* e^(x^2) erfc(x) of x >= 0: a polynomial in s = 1/(1 + x/2) that has the least relative error, fitted [Remez]. */
+/* e^(x^2) erfc(x) of x >= 0: a polynomial in s = 1/(1 + x/2) of the least relative error, by Remez's
+ * algorithm. */
 INLINE vf exp_erfcx(vf x)
 {
     vf s = 1 / (1 + 0.5f * x);
