@@ -253,7 +253,7 @@ bool cli_int(const char *what, const char *text, long lo, long hi, int *out, str
     return true;
 }
 
-static bool read_uint64(const char *what, const char *text, uint64_t *out, struct err *e)
+bool cli_uint64(const char *what, const char *text, uint64_t *out, struct err *e)
 {
     char *end;
     errno = 0;
@@ -317,7 +317,7 @@ int cli_processors(void)
 bool cli_uint32(const char *what, const char *text, uint32_t *out, struct err *e)
 {
     uint64_t v = 0;
-    if (!read_uint64(what, text, &v, e))
+    if (!cli_uint64(what, text, &v, e))
         return false;
     *out = (uint32_t)v;
     return v <= UINT32_MAX || err_set(e, "%s: '%s' is above 2^32-1", what, text);
@@ -354,7 +354,7 @@ static bool read_value(const struct cli_option *o, const char *text, void *to, s
     else if (o->kind == CLI_UINT32)
         return cli_uint32(what, text, to, e);
     else if (o->kind == CLI_UINT64)
-        return read_uint64(what, text, to, e);
+        return cli_uint64(what, text, to, e);
     else if (o->kind == CLI_RANGE)
         return read_range(o, what, text, to, e);
     else

@@ -104,6 +104,7 @@ void cli_print_help(const char *usage, const struct cli_option *options);
 /* The whole of `text` must be a number inside [lo, hi]; `what` names it in the line. A whole one may be written as 1e3. */
 NODISCARD bool cli_int(const char *what, const char *text, long lo, long hi, int *out,
                        struct err *e);
+NODISCARD bool cli_uint64(const char *what, const char *text, uint64_t *out, struct err *e);
 NODISCARD bool cli_uint32(const char *what, const char *text, uint32_t *out, struct err *e);
 NODISCARD bool cli_double(const char *what, const char *text, double lo, double hi, double *out,
                           struct err *e);

@@ -105,6 +105,27 @@ static bool read_cell(void *options, const char *const v[4], struct err *e)
     return true;
 }
 
+static bool read_seeds(void *options, const char *const v[4], struct err *e)
+{
+    struct options *s = options;
+    const char *text = v[0];
+    for (s->num_seeds = 0; text != NULL; s->num_seeds++) {
+        char one[32];
+        size_t n = strcspn(text, ",");
+        snprintf(one, sizeof one, "%.*s", (int)n, text);
+        if (s->num_seeds == MAX_SEEDS)
+            return err_set(e, "--seed: at most %d", MAX_SEEDS);
+        if (!cli_uint64("--seed", one, &s->seeds[s->num_seeds], e))
+            return false;
+        for (int k = 0; k < s->num_seeds; k++)
+            if (s->seeds[k] == s->seeds[s->num_seeds])
+                return err_set(e, "--seed: %s is there twice", one);
+        text = text[n] == ',' ? text + n + 1 : NULL;
+    }
+    s->seed = s->seeds[0];
+    return true;
+}
+
 static bool read_starter(void *options, const char *const v[4], struct err *e)
 {
     struct options *s = options;
@@ -191,7 +212,10 @@ static const struct cli_option options[] = {
      "as the assignment's GUI writes them (the first camera)",
      TO(camera_file)},
     {0, "list-cameras", "", "print the scene's cameras", TO(action), ACTION_CAMERAS},
-    {0, "seed", "N", "64-bit seed of all samples (1)", TO(seed)},
+    {0, "seed", "N[,N...]",
+     "64-bit seed of all samples (1); of several an image each,\n"
+     "FILE_N.exr",
+     .read = read_seeds},
     {0, "sampler", "NAME", "independent or sobol: less noise, but unknown error (independent)",
      TO(sampler), .names = sampler_kind_names},
     {0, "integrator", "NAME", "path or normals (path)", TO(kind), .names = integrator_kind_names},
@@ -263,6 +287,8 @@ static bool complete(struct options *s, struct err *e)
     }
     if (s->last == 0)
         s->last = s->spp;
+    if (s->num_seeds > 1 && (s->resume != NULL || s->slurm > 0))
+        return err_set(e, "--seed: one alone with --resume and --slurm");
     if (s->last > s->spp)
         return err_set(e, "--samples: %d:%d goes past the %d of --spp", s->first, s->last, s->spp);
     if (s->starter != 0 && s->direct == DIRECT_MIS && s->kind == INTEGRATE_PATHS)

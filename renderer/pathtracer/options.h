@@ -4,7 +4,7 @@
 
 #include "renderer/transport/render.h"
 
-enum { MAX_OUTPUTS = 8 };
+enum { MAX_OUTPUTS = 8, MAX_SEEDS = 64 };
 
 enum { FRESNEL_EXACT, FRESNEL_SCHLICK }; /* options.fresnel */
 enum { FRAME_CROP, FRAME_WHOLE };        /* options.frame */
@@ -27,7 +27,9 @@ struct options {
     bool quiet, aov, keep_state;
     enum roulette_kind roulette;
     double survival; /* of ROULETTE_FIXED */
-    uint64_t seed;
+    uint64_t seed;   /* of several the first */
+    uint64_t seeds[MAX_SEEDS];
+    int num_seeds;      /* 0: seed alone */
     int adaptive_batch; /* 0: off */
     double adaptive_tolerance;
     int pilot;                                  /* samples */

@@ -1,4 +1,5 @@
 /* pathtracer: options -> scene -> render -> images. */
+#include "renderer/base/cli_rewrite.h"
 #include "renderer/collada/collada.h"
 #include "renderer/base/fs.h"
 #include "heatmap.h"
@@ -197,31 +198,20 @@ static bool write_heatmap(const struct output *out, const struct bvh *bvh, const
     return true;
 }
 
-static bool run(struct session *s, struct err *e)
+/* One image of what is loaded. is_last: a signal that comes too late for it is of no use to another. */
+static bool render_seed(struct session *s, const struct camera *camera, const struct bvh *bvh,
+                        bool is_last, struct err *e)
 {
     const struct options *o = s->out.opt;
     struct render_id id;
-    struct scene scene = {0};
-    struct camera camera;
     struct film film = {0};
-    struct bvh *bvh = NULL;
     bool ok = false;
-    if (!load_scene(o, &scene, e) || !output_check(&s->out, e) ||
-        !setup_camera(o, &scene, &camera, e) || !render_id_make(o, &scene, &id, e))
-        goto done;
-    double start = now_seconds();
-    bvh = bvh_build_on(&scene, (enum bvh_kind)o->accel, (enum isa)o->isa, o->threads, e);
-    if (bvh == NULL)
-        goto done;
-    snprintf(s->out.accel, sizeof s->out.accel,
-             "%s: %u nodes, depth %d, SAH cost %.1f, built in %.3f s", bvh_kind_names[o->accel],
-             bvh_num_nodes(bvh), bvh_depth(bvh), bvh_sah_cost(bvh), now_seconds() - start);
     s->out.id = &id;
-    s->out.scene = &scene;
-    if (!output_state_path(&s->out, NULL, s->state_path, e) || !start_film(s, o, &film, e))
+    if (!render_id_make(o, s->out.scene, &id, e) ||
+        !output_state_path(&s->out, NULL, s->state_path, e) || !start_film(s, o, &film, e))
         goto done;
     const struct render_options opt = render_options_of(o);
-    if (o->heatmap != NULL && !write_heatmap(&s->out, bvh, &camera, &opt, e))
+    if (o->heatmap != NULL && !write_heatmap(&s->out, bvh, camera, &opt, e))
         goto done;
     const struct render_control control = {.max_seconds = o->max_seconds,
                                            .max_error = o->max_error,
@@ -233,20 +223,81 @@ static bool run(struct session *s, struct err *e)
     struct render_stats stats;
     progress_start(&progress, "rendering", "Mpaths", o->quiet);
     hold_signals(s);
-    if (!render_film(&scene, &camera, bvh, &opt, &control, &progress, &film, &stats, e))
+    if (!render_film(s->out.scene, camera, bvh, &opt, &control, &progress, &film, &stats, e))
         goto done;
     progress_end(&progress, stats.samples);
-    if (stats.end != RENDER_ASKED)
+    if (stats.end != RENDER_ASKED && is_last)
         s->signal = 0; /* it came too late to cut anything short */
     ok = finish(s, &film, &stats, e);
     if (ok)
         output_print_summary(&s->out, &film, &stats);
-    if (ok && s->signal != 0)
+    if (ok && stats.end == RENDER_ASKED)
         output_print_how_to_resume(&s->out, &film);
 done:
     s->out.id = NULL; /* this function's own */
-    s->out.scene = NULL;
     film_free(&film);
+    return ok;
+}
+
+/* The same with a seed of several, as if the command were "--seed N -f OUT_N.exr ...", which is what the image says. */
+static bool render_one_of(struct session *s, int k, const struct camera *camera,
+                          const struct bvh *bvh, struct err *e)
+{
+    static const struct option_words own[] = {{"-f", 1}, {"--out", 1}, {"--seed", 1}, {0}};
+    const struct options *all = s->out.opt;
+    const struct output out = s->out;
+    struct options o = *all;
+    struct path name[MAX_OUTPUTS];
+    char seed[24], seed_option[] = "--seed", out_option[] = "-f";
+    char **word = calloc((size_t)out.argc + 3 + 2 * MAX_OUTPUTS, sizeof *word);
+    if (word == NULL)
+        return err_set(e, "out of memory");
+    snprintf(seed, sizeof seed, "%llu", (unsigned long long)all->seeds[k]);
+    int n = 0;
+    word[n++] = out.argv[0];
+    word[n++] = seed_option;
+    word[n++] = seed;
+    for (int i = 0; i < o.num_outputs; i++) {
+        const char *file = all->output[i], *dot = strrchr(file, '.');
+        name[i] = fs_path("%.*s_%s%s", (int)(dot - file), file, seed, dot);
+        o.output[i] = name[i].s;
+        word[n++] = out_option;
+        word[n++] = name[i].s;
+    }
+    o.seed = all->seeds[k];
+    o.heatmap = k == 0 ? o.heatmap : NULL;
+    s->out.opt = &o;
+    s->out.argc = n + cli_rewrite_kept(own, out.argc - 1, out.argv + 1, word + n);
+    s->out.argv = word;
+    bool ok = output_check(&s->out, e) && render_seed(s, camera, bvh, k + 1 == o.num_seeds, e);
+    s->out = out;
+    free(word);
+    return ok;
+}
+
+static bool run(struct session *s, struct err *e)
+{
+    const struct options *o = s->out.opt;
+    struct scene scene = {0};
+    struct camera camera;
+    struct bvh *bvh = NULL;
+    bool ok = load_scene(o, &scene, e) && (o->num_seeds > 1 || output_check(&s->out, e)) &&
+              setup_camera(o, &scene, &camera, e);
+    double start = now_seconds();
+    if (ok)
+        bvh = bvh_build_on(&scene, (enum bvh_kind)o->accel, (enum isa)o->isa, o->threads, e);
+    ok = bvh != NULL;
+    if (ok) {
+        snprintf(s->out.accel, sizeof s->out.accel,
+                 "%s: %u nodes, depth %d, SAH cost %.1f, built in %.3f s", bvh_kind_names[o->accel],
+                 bvh_num_nodes(bvh), bvh_depth(bvh), bvh_sah_cost(bvh), now_seconds() - start);
+        s->out.scene = &scene;
+    }
+    if (o->num_seeds < 2)
+        ok = ok && render_seed(s, &camera, bvh, true, e);
+    for (int k = 0; o->num_seeds > 1 && ok && k < o->num_seeds && s->signal == 0; k++)
+        ok = render_one_of(s, k, &camera, bvh, e);
+    s->out.scene = NULL; /* this function's own */
     bvh_free(bvh);
     scene_free(&scene);
     return ok;

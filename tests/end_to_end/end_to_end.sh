@@ -119,6 +119,15 @@ fi
 if cmp -s "$tmp/a1.png" "$tmp/a3.png"; then
     not_ok "another seed, another image" "PNG files are the same"
 else ok "another seed, another image"; fi
+expect "two seeds, two images" 0 "written: $tmp/of_2.exr $tmp/of_2.png" \
+    "$san_pathtracer" ${small% -q} --seed 1,2 -f "$tmp/of.exr" -f "$tmp/of.png" $scene
+if cmp -s "$tmp/a1.png" "$tmp/of_1.png" && cmp -s "$tmp/a3.png" "$tmp/of_2.png"; then ok "two seeds, the bytes of each"; else
+    not_ok "two seeds, the bytes of each" "PNG files differ"
+fi
+expect "two seeds, made again one by one" 0 "made again by: .* --seed 2 " "$assay" reproduce "$tmp/of_2.exr"
+expect "one seed twice" 3 "--seed: 7 is there twice" "$san_pathtracer" --seed 7,7 -f "$tmp/of.exr" $scene
+expect "two seeds, resumed" 3 "one alone with --resume" "$san_pathtracer" --seed 1,2 --resume "$tmp/of_1.exr" -f "$tmp/of.exr" $scene
+expect "two seeds in jobs" 3 "--seed: cannot be cut" "$assay" slurm pathtracer --seed 1,2 -f "$tmp/of.exr" $scene
 
 # What tests/support/asan_options.c turns off is on without it: else a search for leaks now and then dies of where a variable happens to lie.
 sky=reference/scenes/46_sky.exr

@@ -41,6 +41,7 @@ static bool check_options(const struct options *o, struct err *e)
               {o->max_error > 0, "--error", "looks at all of the image"},
               {o->write_every > 0, "--write-every", "needs all of the image"},
               {o->resume != NULL, "--resume", "goes on with all of the image"},
+              {o->num_seeds > 1, "--seed", "one alone"},
               {o->heatmap != NULL, "--heatmap", "is made at once, without jobs"}};
     for (size_t i = 0; i < sizeof no / sizeof *no; i++)
         if (no[i].given)

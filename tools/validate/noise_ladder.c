@@ -5,6 +5,7 @@
 #include "reference/truth/truth.h"
 #include "renderer/base/fs.h"
 #include "renderer/base/progress.h"
+#include "renderer/pathtracer/options.h"
 #include "run_pathtracer.h"
 
 #include <assert.h>
@@ -56,8 +57,9 @@ bool noise_ladder_add(struct noise_ladder *l, const float *images, int spp, doub
     return true;
 }
 
-static bool render_one(const struct noise_job *job, int rung, int k, struct moments *out,
-                       double *cpu_s, struct err *e)
+/* Replicates first .. first+num-1 of a rung, at most MAX_SEEDS. */
+static bool render_rung(const struct noise_job *job, int rung, int first, int num,
+                        struct moments *out, double *cpu_s, struct err *e)
 {
     static const char *const sobol[] = {"--sampler", "sobol", NULL};
     double left = job->deadline - now_seconds();
@@ -65,21 +67,23 @@ static bool render_one(const struct noise_job *job, int rung, int k, struct mome
         return err_set(e, "the budget is spent");
     const struct path image = fs_path("%s/noise.exr", job->dir);
     const struct path log = fs_path("%s/noise.log", job->dir);
-    /* Batches of replicates, so that more of them leave the seeds of the first as they are. */
-    int batch = k / NOISE_REPLICATES * 2 * NOISE_RUNGS + job->sobol * NOISE_RUNGS + rung;
-    int number = batch * NOISE_REPLICATES + k % NOISE_REPLICATES;
+    uint64_t seed[MAX_SEEDS];
+    for (int i = 0, k = first; i < num; i++, k++) {
+        /* Batches of replicates, so that more of them leave the seeds of the first as they are. */
+        int batch = k / NOISE_REPLICATES * 2 * NOISE_RUNGS + job->sobol * NOISE_RUNGS + rung;
+        int number = batch * NOISE_REPLICATES + k % NOISE_REPLICATES;
+        seed[i] = replicate_seed(job->seed, (int)job->first + number);
+    }
     const struct pathtracer_job ours = {.program = job->pathtracer,
                                         .scene = job->scene,
                                         .spp = noise_ladder_spp[rung],
                                         .options = job->sobol ? sobol : NULL,
-                                        .seed = replicate_seed(job->seed, (int)job->first + number),
                                         .threads = job->threads,
-                                        .timeout_s = fmin(left, job->timeout_s),
+                                        .timeout_s = fmin(left / num, job->timeout_s),
                                         .image = image.s,
                                         .log = log.s};
-    if (!run_pathtracer(&ours, out, cpu_s, NULL, e))
+    if (!run_pathtracer_seeds(&ours, seed, num, out, cpu_s, e))
         return false;
-    unlink(image.s);
     unlink(log.s);
     return true;
 }
@@ -106,24 +110,28 @@ static bool begin(const struct noise_job *job, struct noise_renders *r, struct e
     return (ok && (job->sobol || r->last != NULL)) || err_set(e, "out of memory");
 }
 
-/* Replicate k of every rung. */
-static bool climb(const struct noise_job *job, int k, struct noise_renders *r, struct err *e)
+/* The next replicates of every rung, up to `count` of them. */
+static bool climb(const struct noise_job *job, int count, struct noise_renders *r, struct err *e)
 {
     const size_t size = job->unit->size;
+    const int first = r->done, num = count - first < MAX_SEEDS ? count - first : MAX_SEEDS;
     for (int rung = 0; rung < NOISE_RUNGS; rung++) {
-        struct moments m;
+        struct moments m[MAX_SEEDS];
         double cpu_s;
-        if (!render_one(job, rung, k, &m, &cpu_s, e))
+        if (!render_rung(job, rung, first, num, m, &cpu_s, e))
             return false;
-        for (size_t i = 0; i < size; i++)
-            r->images[rung][(size_t)k * size + i] = (float)m.mean[i];
+        for (int k = 0; k < num; k++) {
+            float *image = r->images[rung] + (size_t)(first + k) * size;
+            for (size_t i = 0; i < size; i++)
+                image[i] = (float)m[k].mean[i];
+            if (rung == NOISE_RUNGS - 1 && !job->sobol)
+                r->last[first + k] = m[k];
+            else
+                moments_free(&m[k]);
+        }
         r->cpu_s[rung] += cpu_s;
-        if (rung == NOISE_RUNGS - 1 && !job->sobol)
-            r->last[k] = m;
-        else
-            moments_free(&m);
     }
-    r->done = k + 1;
+    r->done = first + num;
     return true;
 }
 
@@ -134,7 +142,7 @@ bool noise_ladder_render(const struct noise_job *job, int count, struct noise_re
     *out = (struct noise_ladder){.replicates = count};
     bool ok = begin(job, r, e);
     while (ok && r->done < count)
-        ok = climb(job, r->done, r, e);
+        ok = climb(job, count, r, e);
     for (int i = 0; ok && i < NOISE_RUNGS; i++)
         ok = noise_ladder_add(out, r->images[i], noise_ladder_spp[i], r->cpu_s[i] / count,
                               job->unit, width, tile, e);

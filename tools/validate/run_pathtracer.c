@@ -1,8 +1,13 @@
 #include "run_pathtracer.h"
 
 #include "reference/base/process.h"
+#include "renderer/base/fs.h"
+#include "renderer/pathtracer/options.h"
 
+#include <assert.h>
 #include <stdio.h>
+#include <string.h>
+#include <unistd.h>
 
 enum { MAX_ARGUMENTS = 64 };
 
@@ -17,18 +22,18 @@ static struct pathtracer_rays read_rays(const struct image *im)
     return (struct pathtracer_rays){0};
 }
 
-bool run_pathtracer(const struct pathtracer_job *job, struct moments *out, double *cpu_s,
-                    struct pathtracer_rays *rays, struct err *e)
+/* The program with these seeds, as it takes them. */
+static bool run(const struct pathtracer_job *job, const char *seed, double timeout_s, double *cpu_s,
+                struct err *e)
 {
     const struct suite_scene *s = job->scene;
-    char width[16], height[16], spp[16], depth[16], threads[16], seed[32], lens[32], focus[32];
+    char width[16], height[16], spp[16], depth[16], threads[16], lens[32], focus[32];
     char range[32], filter[PIXEL_FILTER_TEXT];
     snprintf(width, sizeof width, "%d", s->width);
     snprintf(height, sizeof height, "%d", s->height);
     snprintf(spp, sizeof spp, "%d", job->spp);
     snprintf(depth, sizeof depth, "%d", s->depth);
     snprintf(threads, sizeof threads, "%d", job->threads);
-    snprintf(seed, sizeof seed, "%llu", (unsigned long long)job->seed);
     snprintf(lens, sizeof lens, "%.17g", s->lens_radius);
     snprintf(focus, sizeof focus, "%.17g", s->focal_distance);
     snprintf(range, sizeof range, "%d:%d", job->first, job->spp);
@@ -60,19 +65,61 @@ bool run_pathtracer(const struct pathtracer_job *job, struct moments *out, doubl
             return err_set(e, "%s: too many options", s->name);
         argv[argc++] = *o;
     }
-    const struct process p = {.argv = argv, .log = job->log, .timeout_s = job->timeout_s};
+    const struct process p = {.argv = argv, .log = job->log, .timeout_s = timeout_s};
     struct process_usage usage;
+    if (!process_run(&p, &usage, e))
+        return false;
+    *cpu_s = usage.cpu_s;
+    return true;
+}
+
+static bool read_image(const struct suite_scene *s, const char *path, struct moments *out,
+                       struct pathtracer_rays *rays, struct err *e)
+{
     struct image im;
-    if (!process_run(&p, &usage, e) || !moments_read(job->image, out, &im, e))
+    if (!moments_read(path, out, &im, e))
         return false;
     if (rays != NULL)
         *rays = read_rays(&im);
     image_free(&im);
-    *cpu_s = usage.cpu_s;
     if (out->width == s->width && out->height == s->height)
         return true;
     err_set(e, "%s: pathtracer wrote %d x %d pixels instead of %d x %d", s->name, out->width,
             out->height, s->width, s->height);
     moments_free(out);
     return false;
+}
+
+bool run_pathtracer(const struct pathtracer_job *job, struct moments *out, double *cpu_s,
+                    struct pathtracer_rays *rays, struct err *e)
+{
+    char seed[32];
+    snprintf(seed, sizeof seed, "%llu", (unsigned long long)job->seed);
+    return run(job, seed, job->timeout_s, cpu_s, e) &&
+           read_image(job->scene, job->image, out, rays, e);
+}
+
+bool run_pathtracer_seeds(const struct pathtracer_job *job, const uint64_t *seed, int num,
+                          struct moments *out, double *cpu_s, struct err *e)
+{
+    char text[24 * MAX_SEEDS];
+    size_t at = 0;
+    int done = 0;
+    assert(num > 0 && num <= MAX_SEEDS);
+    for (int k = 0; k < num; k++)
+        at += (size_t)snprintf(text + at, sizeof text - at, "%s%llu", k > 0 ? "," : "",
+                               (unsigned long long)seed[k]);
+    bool ok = run(job, text, num * job->timeout_s, cpu_s, e);
+    while (ok && done < num) {
+        const struct path image =
+            num == 1 ? fs_path("%s", job->image)
+                     : fs_path("%.*s_%llu.exr", (int)(strlen(job->image) - strlen(".exr")),
+                               job->image, (unsigned long long)seed[done]);
+        ok = read_image(job->scene, image.s, &out[done], NULL, e);
+        done += ok;
+        unlink(image.s);
+    }
+    while (!ok && done > 0)
+        moments_free(&out[--done]);
+    return ok;
 }

@@ -27,4 +27,9 @@ struct pathtracer_rays {
 NODISCARD bool run_pathtracer(const struct pathtracer_job *job, struct moments *out, double *cpu_s,
                               struct pathtracer_rays *rays, struct err *e);
 
+/* One start for at most MAX_SEEDS seeds, each another: out[k] is of seed[k], to the bit what run_pathtracer() reads with it
+ * alone. *cpu_s of all together; each has the timeout. Leaves no images. */
+NODISCARD bool run_pathtracer_seeds(const struct pathtracer_job *job, const uint64_t *seed, int num,
+                                    struct moments *out, double *cpu_s, struct err *e);
+
 #endif
