@@ -1,158 +1,68 @@
 #include "convergence_results.h"
 
+#include "json_shape.h"
 #include "reference/suite/suite.h"
 
-#include <stdlib.h>
 #include <string.h>
 
-static const char measured[] = "MEASURED";
-
-/* A finite positive number, or null where `may_be_null`. */
-static bool check_number(const json_t *object, const char *name, bool positive, bool may_be_null,
-                         const char *where, struct err *e)
-{
-    const json_t *v = json_object_get(object, name);
-    if (may_be_null && json_is_null(v))
-        return true;
-    if (!json_is_number(v) || (positive && !(json_number_value(v) > 0)))
-        return err_set(e, "%s: '%s' is not a %snumber", where, name, positive ? "positive " : "");
-    return true;
-}
-
-static bool check_interval(const json_t *object, const char *name, bool positive, bool may_be_null,
-                           const char *where, struct err *e)
-{
-    const json_t *v = json_object_get(object, name);
-    if (may_be_null && json_is_null(v))
-        return true;
-    return (json_is_interval(v) && (!positive || member_end(object, name, 0) > 0)) ||
-           err_set(e, "%s: '%s' is not an interval", where, name);
-}
-
-static bool check_text(const json_t *object, const char *name, const char *where, struct err *e)
-{
-    return json_is_string(json_object_get(object, name)) ||
-           err_set(e, "%s: '%s' is not a string", where, name);
-}
-
-static bool check_boolean(const json_t *object, const char *name, const char *where, struct err *e)
-{
-    return json_is_boolean(json_object_get(object, name)) ||
-           err_set(e, "%s: '%s' is not true or false", where, name);
-}
-
-static bool check_verdict(const json_t *object, const char *name, const char *where, struct err *e)
-{
-    const char *text = json_string_value(json_object_get(object, name));
-    enum verdict v;
-    return (text != NULL && (strcmp(text, measured) == 0 || verdict_parse(text, &v))) ||
-           err_set(e, "%s: '%s' is not a verdict", where, name);
-}
-
-static bool check_rung(const json_t *g, const char *where, struct err *e)
-{
-    return check_number(g, "spp", true, false, where, e) &&
-           check_number(g, "rmse", true, false, where, e) &&
-           check_interval(g, "rmse_ci", true, true, where, e) &&
-           check_number(g, "variance", true, false, where, e) &&
-           check_interval(g, "variance_ci", true, true, where, e) &&
-           check_number(g, "bias", false, false, where, e) &&
-           check_number(g, "cpu_s", true, false, where, e) &&
-           check_number(g, "efficiency", true, true, where, e) &&
-           check_interval(g, "efficiency_ci", false, true, where, e);
-}
-
-static bool check_rungs(const json_t *owner, const char *where,
-                        bool (*check)(const json_t *, const char *, struct err *), struct err *e)
-{
-    const json_t *rungs = json_object_get(owner, "rungs");
-    if (json_array_size(rungs) < 2)
-        return err_set(e, "%s: 'rungs' is not an array of at least two", where);
-    for (size_t i = 0; i < json_array_size(rungs); i++)
-        if (!check(json_array_get(rungs, i), where, e))
-            return false;
-    return true;
-}
-
-static bool check_engine(const json_t *j, const char *where, struct err *e)
-{
-    if (!check_text(j, "engine", where, e) || !check_boolean(j, "independent", where, e) ||
-        !check_boolean(j, "judged", where, e) || !check_boolean(j, "passed", where, e))
-        return false;
-    bool passed = json_is_true(json_object_get(j, "passed"));
-    if (json_object_get(j, "error") != NULL)
-        return check_text(j, "error", where, e) &&
-               (!passed || err_set(e, "%s: has an 'error' and yet 'passed'", where));
-    if (!check_number(j, "slope", false, false, where, e) ||
-        !check_interval(j, "slope_ci", false, false, where, e) ||
-        !check_interval(j, "floor_ci", false, false, where, e) ||
-        !check_verdict(j, "slope_verdict", where, e) ||
-        !check_verdict(j, "floor_verdict", where, e) || !check_verdict(j, "verdict", where, e) ||
-        !check_text(j, "reason", where, e) || !check_rungs(j, where, check_rung, e))
-        return false;
-    const char *verdict = member_text(j, "verdict");
-    bool good = strcmp(verdict, measured) == 0 || strcmp(verdict, "EQUIVALENT") == 0;
-    return good == passed || err_set(e, "%s: 'passed' contradicts 'verdict'", where);
-}
-
-static bool check_ratio_rung(const json_t *g, const char *where, struct err *e)
-{
-    return check_number(g, "spp", true, false, where, e) &&
-           check_number(g, "variance", true, false, where, e) &&
-           check_interval(g, "variance_ci", true, true, where, e) &&
-           check_number(g, "efficiency", true, true, where, e) &&
-           check_interval(g, "efficiency_ci", false, true, where, e);
-}
+static const struct shape engine_shape = {
+    .names = {[IS_TEXT] = "engine error?", [IS_BOOLEAN] = "independent judged passed"}};
+static const struct shape rung_shape = {
+    .names = {[IS_NUMBER] = "bias",
+              [IS_POSITIVE] = "spp cpu_s",
+              [IS_POSITIVE_ESTIMATE] = "rmse variance efficiency~"}};
+static const struct shape measured_shape = {
+    .names = {[IS_TEXT] = "reason",
+              [IS_NUMBER] = "slope",
+              [IS_INTERVAL] = "slope_ci floor_ci",
+              [IS_VERDICT] = "slope_verdict floor_verdict verdict"},
+    .part = {{"rungs", &rung_shape, PART_LIST_OF_2}}};
+static const struct shape ratio_rung_shape = {
+    .names = {[IS_POSITIVE] = "spp", [IS_POSITIVE_ESTIMATE] = "variance efficiency~"}};
+static const struct shape ratio_shape = {.names = {[IS_TEXT] = "a b"},
+                                         .part = {{"rungs", &ratio_rung_shape, PART_LIST_OF_2}}};
+static const struct shape scene_shape = {
+    .names = {[IS_TEXT] = "scene reference",
+              [IS_NUMBER] =
+                  "width height depth replicates reference_noise alpha margin slope_margin"},
+    .part = {{"engines", &engine_shape, PART_LIST_OF_1}, {"ratios", &ratio_shape, PART_LIST}}};
+static const struct shape depth_shape = {
+    .names = {[IS_NUMBER] = "mean se truth?", [IS_COUNT] = "depth"}};
+static const struct shape depths_shape = {.names = {[IS_COUNT] = "samples"},
+                                          .part = {{"rungs", &depth_shape, PART_LIST_OF_1}}};
 
 bool convergence_results_check_depths(const json_t *depths, const char *where, struct err *e)
 {
     const json_t *rungs = json_object_get(depths, "rungs");
+    char within[700];
+    snprintf(within, sizeof within, "%.650s: 'depths'", where);
     if (json_is_string(json_object_get(depths, "error")))
         return true;
-    if (!json_is_integer(json_object_get(depths, "samples")) || json_array_size(rungs) == 0)
-        return err_set(e, "%s: 'depths' has no whole 'samples' or no 'rungs'", where);
+    if (!json_shape_check(depths, &depths_shape, within, e))
+        return false;
     for (size_t i = 0; i < json_array_size(rungs); i++) {
-        const json_t *g = json_array_get(rungs, i), *depth = json_object_get(g, "depth"),
-                     *before = json_object_get(json_array_get(rungs, i - 1), "depth");
-        if (!json_is_integer(depth) || json_integer_value(depth) < 0 ||
-            (i > 0 && json_integer_value(depth) <= json_integer_value(before)))
-            return err_set(e, "%s: 'depths': 'depth' does not ascend in whole numbers", where);
-        const json_t *se = json_object_get(g, "se"), *truth = json_object_get(g, "truth");
-        if (!json_is_number(json_object_get(g, "mean")) || !json_is_number(se) ||
-            json_number_value(se) < 0 || (truth != NULL && !json_is_number(truth)))
-            return err_set(e, "%s: 'depths': 'mean', 'se' or 'truth' is not a number", where);
+        const json_t *g = json_array_get(rungs, i);
+        if (i > 0 &&
+            member_number(g, "depth") <= member_number(json_array_get(rungs, i - 1), "depth"))
+            return err_set(e, "%s: 'depth' does not ascend", within);
+        if (member_number(g, "se") < 0)
+            return err_set(e, "%s: 'se' is below 0", within);
     }
     return true;
 }
 
 static bool check_scene(const json_t *s, const char *where, struct err *e)
 {
-    static const char *const numbers[] = {"width",           "height", "depth",  "replicates",
-                                          "reference_noise", "alpha",  "margin", "slope_margin"};
-    if (!check_text(s, "scene", where, e) || !check_text(s, "reference", where, e))
+    if (!json_shape_check(s, &scene_shape, where, e))
         return false;
-    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
-        if (!check_number(s, numbers[i], false, false, where, e))
-            return false;
-    const json_t *engines = json_object_get(s, "engines"), *ratios = json_object_get(s, "ratios");
-    if (json_array_size(engines) == 0 || !json_is_array(ratios))
-        return err_set(e, "%s: 'engines' or 'ratios' is not such an array", where);
-    char inner[600];
+    const json_t *engines = json_object_get(s, "engines"), *depths = json_object_get(s, "depths");
     for (size_t i = 0; i < json_array_size(engines); i++) {
         const json_t *j = json_array_get(engines, i);
-        const char *name = member_text(j, "engine");
-        snprintf(inner, sizeof inner, "%.500s, %.60s", where, name != NULL ? name : "?");
-        if (!check_engine(j, inner, e))
+        char inner[600];
+        snprintf(inner, sizeof inner, "%.500s, %.60s", where, member_text(j, "engine"));
+        if (!json_shape_check_row(j, &measured_shape, inner, e))
             return false;
     }
-    for (size_t i = 0; i < json_array_size(ratios); i++) {
-        const json_t *j = json_array_get(ratios, i);
-        snprintf(inner, sizeof inner, "%.500s, ratio %zu", where, i + 1);
-        if (!check_text(j, "a", inner, e) || !check_text(j, "b", inner, e) ||
-            !check_rungs(j, inner, check_ratio_rung, e))
-            return false;
-    }
-    const json_t *depths = json_object_get(s, "depths");
     return depths == NULL || convergence_results_check_depths(depths, where, e);
 }
 
@@ -240,7 +150,7 @@ static void ratio_row(const struct sink *s, const char *scene, const json_t *rat
     snprintf(quantity, sizeof quantity, "%s / %s's at %g spp", name, member_text(ratio, "b"),
              member_number(g, "spp"));
     format_value(text, sizeof text, g, name, interval);
-    emit(s, scene, member_text(ratio, "a"), quantity, text, measured);
+    emit(s, scene, member_text(ratio, "a"), quantity, text, json_shape_measured);
 }
 
 static void ratio_rows(const struct sink *s, const char *scene, const json_t *ratio)

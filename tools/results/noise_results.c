@@ -1,105 +1,43 @@
 #include "noise_results.h"
 
+#include "json_shape.h"
 #include "reference/suite/suite.h"
 #include "tools/base/text.h"
 
 #include <string.h>
 
-static const char measured[] = "MEASURED";
-
-/* A number and, with the ending "_ci", its interval, which a run may not know. */
-static bool check_estimate(const json_t *j, const char *name, bool required, const char *where,
-                           struct err *e)
-{
-    char ci[32];
-    const json_t *v = json_object_get(j, name);
-    snprintf(ci, sizeof ci, "%s_ci", name);
-    const json_t *i = json_object_get(j, ci);
-    if (v == NULL && !required)
-        return true;
-    if (!json_is_number(v))
-        return err_set(e, "%s: '%s' is not a number", where, name);
-    return json_is_null(i) || json_is_interval(i) ||
-           err_set(e, "%s: '%s' is neither an interval nor null", where, ci);
-}
-
-static bool check_place(const json_t *tile, const char *where, struct err *e)
-{
-    return (json_is_integer(json_object_get(tile, "x")) &&
-            json_is_integer(json_object_get(tile, "y"))) ||
-           err_set(e, "%s: a tile has no whole 'x' and 'y'", where);
-}
-
-static bool check_claim(const json_t *j, const char *where, struct err *e)
-{
-    enum verdict v;
-    const char *verdict = member_text(j, "ratio_verdict");
-    if (!check_estimate(j, "ratio", true, where, e))
-        return false;
-    if (!json_is_number(json_object_get(j, "margin")))
-        return err_set(e, "%s: 'margin' is not a number", where);
-    return (verdict != NULL && verdict_parse(verdict, &v)) ||
-           err_set(e, "%s: 'ratio_verdict' is not a verdict", where);
-}
-
-static bool check_measured(const json_t *j, const char *where, struct err *e)
-{
-    const json_t *tile = json_object_get(j, "worst_tile"), *rungs = json_object_get(j, "rungs");
-    if (!check_estimate(j, "variance", true, where, e) || !check_place(tile, where, e) ||
-        !check_estimate(tile, "variance", true, where, e) ||
-        !check_estimate(j, "slope", false, where, e) ||
-        (json_object_get(j, "slope_margin") != NULL &&
-         !json_is_number(json_object_get(j, "slope_margin"))) ||
-        !check_estimate(j, "efficiency", false, where, e))
-        return false;
-    if (json_array_size(rungs) == 0)
-        return err_set(e, "%s: 'rungs' is not an array of at least one", where);
-    for (size_t i = 0; i < json_array_size(rungs); i++) {
-        const json_t *g = json_array_get(rungs, i);
-        if (!json_is_integer(json_object_get(g, "spp")))
-            return err_set(e, "%s: 'spp' of a rung is not a whole number", where);
-        if (!check_estimate(g, "variance", true, where, e))
-            return false;
-    }
-    return true;
-}
-
-static bool check_judged(const json_t *j, const char *where, struct err *e)
-{
-    enum verdict v;
-    const char *verdict = member_text(j, "verdict");
-    const json_t *tile = json_object_get(j, "tile_claim"), *stated = json_object_get(j, "stated");
-    if (member_text(j, "against") == NULL || member_text(j, "reason") == NULL ||
-        !json_is_number(json_object_get(j, "seconds")))
-        return err_set(e, "%s: 'against', 'reason' or 'seconds' is missing", where);
-    if (!check_claim(j, where, e) || (stated != NULL && !check_claim(stated, where, e)) ||
-        (tile != NULL && (!check_place(tile, where, e) || !check_claim(tile, where, e))))
-        return false;
-    return (verdict_parse(verdict, &v) &&
-            json_is_true(json_object_get(j, "passed")) == (v == VERDICT_EQUIVALENT)) ||
-           err_set(e, "%s: 'verdict' is unknown or 'passed' contradicts it", where);
-}
+static const struct shape row_shape = {.names = {[IS_TEXT] = "scene engine error?"}};
+static const struct shape tile_shape = {.names = {[IS_ESTIMATE] = "variance", [IS_COUNT] = "x y"}};
+static const struct shape rung_shape = {.names = {[IS_ESTIMATE] = "variance", [IS_COUNT] = "spp"}};
+static const struct shape measured_shape = {
+    .names = {[IS_NUMBER] = "alpha slope_margin?",
+              [IS_ESTIMATE] = "variance slope? efficiency?",
+              [IS_VERDICT] = "verdict"},
+    .part = {{"worst_tile", &tile_shape, PART_OBJECT}, {"rungs", &rung_shape, PART_LIST_OF_1}}};
+static const struct shape stated_shape = {
+    .names = {[IS_NUMBER] = "margin", [IS_ESTIMATE] = "ratio", [IS_VERDICT] = "ratio_verdict"}};
+static const struct shape tile_claim_shape = {.names = {[IS_NUMBER] = "margin",
+                                                        [IS_ESTIMATE] = "ratio",
+                                                        [IS_COUNT] = "x y",
+                                                        [IS_VERDICT] = "ratio_verdict"}};
+static const struct shape judged_shape = {.names = {[IS_TEXT] = "against reason",
+                                                    [IS_NUMBER] = "seconds margin",
+                                                    [IS_ESTIMATE] = "ratio",
+                                                    [IS_VERDICT] = "ratio_verdict"},
+                                          .part = {{"tile_claim?", &tile_claim_shape, PART_OBJECT},
+                                                   {"stated?", &stated_shape, PART_OBJECT}}};
 
 static bool check_one(const json_t *j, const char *where, struct err *e)
 {
     const char *verdict = member_text(j, "verdict");
-    bool passed = json_is_true(json_object_get(j, "passed"));
-    if (member_text(j, "scene") == NULL || member_text(j, "engine") == NULL)
-        return err_set(e, "%s: 'scene' or 'engine' is missing", where);
-    if (member_text(j, "error") != NULL)
-        return (!passed &&
-                (verdict == NULL || strcmp(verdict, verdict_name(VERDICT_INCONCLUSIVE)) == 0)) ||
-               err_set(e, "%s: has an 'error' and yet 'passed' or a 'verdict'", where);
-    if (member_text(j, "not_stored") != NULL)
-        return (passed && verdict == NULL) ||
-               err_set(e, "%s: is not stored and yet has a 'verdict'", where);
-    if (verdict == NULL || !json_is_number(json_object_get(j, "alpha")))
-        return err_set(e, "%s: 'verdict' or 'alpha' is missing", where);
-    if (!check_measured(j, where, e))
+    if (!json_shape_check(j, &row_shape, where, e))
         return false;
-    if (strcmp(verdict, measured) == 0)
-        return passed || err_set(e, "%s: is MEASURED and yet not 'passed'", where);
-    return check_judged(j, where, e);
+    if (member_text(j, "not_stored") != NULL)
+        return (json_is_true(json_object_get(j, "passed")) && verdict == NULL) ||
+               err_set(e, "%s: is not stored and yet has a 'verdict'", where);
+    return json_shape_check_row(j, &measured_shape, where, e) &&
+           (verdict == NULL || strcmp(verdict, json_shape_measured) == 0 ||
+            member_text(j, "error") != NULL || json_shape_check(j, &judged_shape, where, e));
 }
 
 bool noise_results_check(const json_t *noise, const char *path, struct err *e)

@@ -4,144 +4,57 @@
 #include "reference/suite/suite.h"
 #include "stated_error_results.h"
 #include "convergence_results.h"
+#include "json_shape.h"
 #include "noise_results.h"
 
-#include <assert.h>
 #include <string.h>
 
-enum member_type { STRING, NUMBER, COUNT, BOOLEAN, INTERVAL, TRIPLE, COUNTS, OBJECT };
-
-struct member {
-    const char *name;
-    enum member_type type;
-    bool required;
-};
-
-static const struct member root_members[] = {
-    {"command", STRING, true},  {"version", STRING, true},  {"date", STRING, true},
-    {"alpha", NUMBER, true},    {"machine", STRING, false}, {"mode", STRING, false},
-    {"located", STRING, false}, {"seconds", NUMBER, false}};
+static const struct shape root_shape = {
+    .names = {[IS_TEXT] = "command version date machine? mode? located?",
+              [IS_NUMBER] = "alpha seconds?"}};
+static const struct shape cost_shape = {.names = {[IS_NUMBER] = "a b"}};
+static const struct shape look_shape = {
+    .names = {[IS_TEXT] = "verdict", [IS_NUMBER] = "n_a n_b alpha", [IS_COUNT] = "stage"}};
 
 /* A claim that could not be judged has these and no more. */
-static const struct member any_claim_members[] = {{"scene", STRING, true},
-                                                  {"a", STRING, true},
-                                                  {"b", STRING, true},
-                                                  {"expected", STRING, true},
-                                                  {"passed", BOOLEAN, true},
-                                                  {"title", STRING, false},
-                                                  {"detects", STRING, false},
-                                                  {"blind_to", STRING, false},
-                                                  {"error", STRING, false},
-                                                  {"quantity", STRING, false},
-                                                  {"rerun", STRING, false},
-                                                  {"stages", COUNT, false},
-                                                  {"alpha_claim", NUMBER, false},
-                                                  {"alpha_spent", NUMBER, false},
-                                                  {"cost_s", OBJECT, false}};
+static const struct shape any_claim_shape = {
+    .names = {[IS_TEXT] = "scene a b expected title? detects? blind_to? error? quantity? rerun?",
+              [IS_NUMBER] = "alpha_claim? alpha_spent?",
+              [IS_COUNT] = "stages?",
+              [IS_BOOLEAN] = "passed"},
+    .part = {{"cost_s?", &cost_shape, PART_OBJECT}, {"looks?", &look_shape, PART_LIST}}};
 
-static const struct member judged_members[] = {
-    {"quantity", STRING, true},      {"verdict", STRING, true},
-    {"reason", STRING, true},        {"alpha", NUMBER, true},
-    {"margin_global", NUMBER, true}, {"margin_tile", NUMBER, true},
-    {"tile", COUNT, true},           {"difference", NUMBER, true},
-    {"ci", INTERVAL, true},          {"channel_difference", TRIPLE, true},
-    {"log10_p", NUMBER, true},       {"mdb_global", NUMBER, true},
-    {"mdb_tile", NUMBER, true},      {"num_tests", COUNT, true},
-    {"worst_tile", OBJECT, true},    {"worst", OBJECT, true},
-    {"rms_bias", NUMBER, true},      {"extra_factor", NUMBER, true},
-    {"skew_limited", BOOLEAN, true}, {"tiles_x", COUNT, true},
-    {"tiles_y", COUNT, true},        {"files", OBJECT, true},
-    {"hint", OBJECT, false},         {"variance_ratio", OBJECT, false},
-    {"class", STRING, false},        {"n_a", NUMBER, false},
-    {"n_b", NUMBER, false},          {"unit_b", STRING, false},
-    {"spp_b", NUMBER, false},        {"seconds_a", NUMBER, false},
-    {"seconds_b", NUMBER, false},    {"rays_a", OBJECT, false},
-    {"seed_a", COUNT, false},        {"seeds_b", COUNTS, false},
-    {"version_b", STRING, false},    {"accept_mdb", INTERVAL, false}};
+static const struct shape worst_tile_shape = {
+    .names = {[IS_NUMBER] = "difference t", [IS_COUNT] = "x y width height", [IS_INTERVAL] = "ci"}};
+static const struct shape worst_shape = {.names = {[IS_NUMBER] = "difference t",
+                                                   [IS_COUNT] = "x y width height channel",
+                                                   [IS_INTERVAL] = "ci"}};
+static const struct shape statistic_shape = {
+    .names = {[IS_TEXT] = "name what", [IS_NUMBER] = "share log10_p", [IS_COUNT] = "num_tests"}};
+static const struct shape hint_shape = {
+    .names = {[IS_TEXT] = "name unit", [IS_NUMBER] = "removed amount"}};
+static const struct shape variance_ratio_shape = {
+    .names = {[IS_NUMBER] = "ratio", [IS_INTERVAL] = "ci"}};
+static const struct shape rays_shape = {.names = {[IS_NUMBER] = "rays box_tests primitive_tests"}};
+static const struct shape files_shape = {.names = {[IS_TEXT] = "a b z relative"}};
 
-static const struct member worst_tile_members[] = {
-    {"x", COUNT, true},      {"y", COUNT, true},           {"width", COUNT, true},
-    {"height", COUNT, true}, {"difference", NUMBER, true}, {"ci", INTERVAL, true},
-    {"t", NUMBER, true}};
-
-static const struct member worst_members[] = {
-    {"x", COUNT, true},      {"y", COUNT, true},       {"width", COUNT, true},
-    {"height", COUNT, true}, {"channel", COUNT, true}, {"difference", NUMBER, true},
-    {"ci", INTERVAL, true},  {"t", NUMBER, true}};
-
-static const struct member statistic_members[] = {{"name", STRING, true},
-                                                  {"share", NUMBER, true},
-                                                  {"num_tests", COUNT, true},
-                                                  {"log10_p", NUMBER, true},
-                                                  {"what", STRING, true}};
-
-static const struct member hint_members[] = {{"name", STRING, true},
-                                             {"removed", NUMBER, true},
-                                             {"amount", NUMBER, true},
-                                             {"unit", STRING, true}};
-
-static const struct member variance_ratio_members[] = {{"ratio", NUMBER, true},
-                                                       {"ci", INTERVAL, true}};
-
-static const struct member rays_members[] = {
-    {"rays", NUMBER, true}, {"box_tests", NUMBER, true}, {"primitive_tests", NUMBER, true}};
-
-static const struct member file_members[] = {
-    {"a", STRING, true}, {"b", STRING, true}, {"z", STRING, true}, {"relative", STRING, true}};
-
-#define LENGTH(array) (sizeof(array) / sizeof(array)[0])
-
-static bool is_count(const json_t *v)
-{
-    return json_is_integer(v) && json_integer_value(v) >= 0;
-}
-
-static bool is_triple(const json_t *v)
-{
-    double x, y, z;
-    return json_unpack((json_t *)v, "[FFF!]", &x, &y, &z) == 0;
-}
-
-/* NULL if v is of that type, else what it should be, in words. */
-static const char *type_error(const json_t *v, enum member_type type)
-{
-    switch (type) {
-    case STRING: return json_is_string(v) ? NULL : "a string";
-    case NUMBER: return json_is_number(v) ? NULL : "a number";
-    case COUNT: return is_count(v) ? NULL : "a whole number of 0 or more";
-    case BOOLEAN: return json_is_boolean(v) ? NULL : "true or false";
-    case INTERVAL: return json_is_interval(v) ? NULL : "an array of two numbers, the lower first";
-    case TRIPLE: return is_triple(v) ? NULL : "an array of three numbers";
-    case COUNTS:
-        if (!json_is_array(v))
-            return "an array of whole numbers";
-        for (size_t i = 0; i < json_array_size(v); i++)
-            if (!is_count(json_array_get(v, i)))
-                return "an array of whole numbers";
-        return NULL;
-    case OBJECT: return json_is_object(v) ? NULL : "an object";
-    }
-    assert(!"unknown member type");
-    return "known";
-}
-
-/* The line begins with where (the file and claim) and within (the object's name and a dot, or "").
- */
-static bool check_members(const json_t *object, const struct member *member, size_t num,
-                          const char *where, const char *within, struct err *e)
-{
-    for (size_t i = 0; i < num; i++) {
-        const json_t *v = json_object_get(object, member[i].name);
-        if (v == NULL && !member[i].required)
-            continue;
-        if (v == NULL)
-            return err_set(e, "%s: '%s%s' is missing", where, within, member[i].name);
-        const char *wanted = type_error(v, member[i].type);
-        if (wanted != NULL)
-            return err_set(e, "%s: '%s%s' is not %s", where, within, member[i].name, wanted);
-    }
-    return true;
-}
+static const struct shape judged_shape = {
+    .names =
+        {[IS_TEXT] = "quantity verdict reason class? unit_b? version_b?",
+         [IS_NUMBER] =
+             "alpha margin_global margin_tile difference log10_p mdb_global mdb_tile rms_bias extra_factor n_a? n_b? spp_b? seconds_a? seconds_b?",
+         [IS_COUNT] = "tile num_tests tiles_x tiles_y seed_a?",
+         [IS_BOOLEAN] = "skew_limited",
+         [IS_INTERVAL] = "ci accept_mdb?",
+         [IS_TRIPLE] = "channel_difference",
+         [IS_COUNTS] = "seeds_b?"},
+    .part = {{"worst_tile", &worst_tile_shape, PART_OBJECT},
+             {"worst", &worst_shape, PART_OBJECT},
+             {"statistics", &statistic_shape, PART_LIST_OF_1},
+             {"files", &files_shape, PART_OBJECT},
+             {"hint?", &hint_shape, PART_OBJECT},
+             {"variance_ratio?", &variance_ratio_shape, PART_OBJECT},
+             {"rays_a?", &rays_shape, PART_OBJECT}}};
 
 /* One number, or null where a tile has no noise and so no test, for each tile. */
 static bool check_tiles(const json_t *claim, const char *name, size_t num, const char *where,
@@ -161,52 +74,10 @@ static bool check_tiles(const json_t *claim, const char *name, size_t num, const
     return true;
 }
 
-static bool check_statistics(const json_t *claim, const char *where, struct err *e)
-{
-    const json_t *all = json_object_get(claim, "statistics");
-    if (all == NULL)
-        return err_set(e, "%s: 'statistics' is missing", where);
-    if (!json_is_array(all) || json_array_size(all) == 0)
-        return err_set(e, "%s: 'statistics' is not an array with at least one statistic", where);
-    for (size_t i = 0; i < json_array_size(all); i++) {
-        const json_t *s = json_array_get(all, i);
-        if (!json_is_object(s))
-            return err_set(e, "%s: 'statistics' has an element %zu that is not an object", where,
-                           i);
-        if (!check_members(s, statistic_members, LENGTH(statistic_members), where, "statistics.",
-                           e))
-            return false;
-    }
-    return true;
-}
-
-/* Members that may be absent. */
-static bool check_findings(const json_t *claim, const char *where, struct err *e)
-{
-    const json_t *hint = json_object_get(claim, "hint");
-    const json_t *ratio = json_object_get(claim, "variance_ratio");
-    const json_t *rays = json_object_get(claim, "rays_a");
-    return (rays == NULL ||
-            check_members(rays, rays_members, LENGTH(rays_members), where, "rays_a.", e)) &&
-           (hint == NULL ||
-            check_members(hint, hint_members, LENGTH(hint_members), where, "hint.", e)) &&
-           (ratio == NULL ||
-            check_members(ratio, variance_ratio_members, LENGTH(variance_ratio_members), where,
-                          "variance_ratio.", e));
-}
-
 static bool check_judged(const json_t *claim, const char *where, struct err *e)
 {
-    if (!check_members(claim, judged_members, LENGTH(judged_members), where, "", e) ||
-        !check_members(json_object_get(claim, "worst_tile"), worst_tile_members,
-                       LENGTH(worst_tile_members), where, "worst_tile.", e) ||
-        !check_members(json_object_get(claim, "worst"), worst_members, LENGTH(worst_members), where,
-                       "worst.", e) ||
-        !check_members(json_object_get(claim, "files"), file_members, LENGTH(file_members), where,
-                       "files.", e) ||
-        !check_statistics(claim, where, e) || !check_findings(claim, where, e))
+    if (!json_shape_check(claim, &judged_shape, where, e))
         return false;
-
     json_int_t tiles_x = json_integer_value(json_object_get(claim, "tiles_x"));
     json_int_t tiles_y = json_integer_value(json_object_get(claim, "tiles_y"));
     if (tiles_x < 1 || tiles_y < 1 || tiles_x > 65536 || tiles_y > 65536)
@@ -237,32 +108,11 @@ static bool check_judged(const json_t *claim, const char *where, struct err *e)
     return true;
 }
 
-static const struct member look_members[] = {{"n_a", NUMBER, true},
-                                             {"n_b", NUMBER, true},
-                                             {"alpha", NUMBER, true},
-                                             {"stage", COUNT, true},
-                                             {"verdict", STRING, true}};
-static const struct member cost_members[] = {{"a", NUMBER, true}, {"b", NUMBER, true}};
-
-static bool check_looks(const json_t *claim, const char *where, struct err *e)
-{
-    const json_t *looks = json_object_get(claim, "looks"), *cost = json_object_get(claim, "cost_s");
-    if (looks != NULL && !json_is_array(looks))
-        return err_set(e, "%s: 'looks' is not an array", where);
-    for (size_t i = 0; i < json_array_size(looks); i++)
-        if (!check_members(json_array_get(looks, i), look_members, LENGTH(look_members), where,
-                           "looks.", e))
-            return false;
-    return cost == NULL ||
-           check_members(cost, cost_members, LENGTH(cost_members), where, "cost_s.", e);
-}
-
 static bool check_claim(const json_t *claim, const char *where, struct err *e)
 {
     if (!json_is_object(claim))
         return err_set(e, "%s: not an object", where);
-    if (!check_members(claim, any_claim_members, LENGTH(any_claim_members), where, "", e) ||
-        !check_looks(claim, where, e))
+    if (!json_shape_check(claim, &any_claim_shape, where, e))
         return false;
     enum verdict expected;
     const char *name = member_text(claim, "expected");
@@ -284,7 +134,7 @@ static bool check_results(const json_t *root, const char *path, struct err *e)
     const json_t *schema = json_object_get(root, "assay");
     if (!json_is_integer(schema) || json_integer_value(schema) != 1)
         return err_set(e, "%s: 'assay' is not 1: not results of this version's schema", path);
-    if (!check_members(root, root_members, LENGTH(root_members), path, "", e))
+    if (!json_shape_check(root, &root_shape, path, e))
         return false;
     const json_t *claims = json_object_get(root, "claims");
     const json_t *convergence = json_object_get(root, "convergence");

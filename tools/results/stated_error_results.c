@@ -1,46 +1,18 @@
 #include "stated_error_results.h"
 
+#include "json_shape.h"
 #include "reference/suite/suite.h"
 
 #include <string.h>
 
-/* Of a claim with an error. */
-static bool only_time_missing(const json_t *c)
-{
-    const char *verdict = member_text(c, "verdict");
-    return verdict == NULL || strcmp(verdict, verdict_name(VERDICT_INCONCLUSIVE)) == 0;
-}
-
-static bool check_one(const json_t *c, const char *where, struct err *e)
-{
-    static const char *const numbers[] = {"renders", "spp",   "alpha",  "margin",
-                                          "pixels",  "image", "seconds"};
-    bool passed = json_is_true(json_object_get(c, "passed"));
-    if (member_text(c, "scene") == NULL || member_text(c, "engine") == NULL)
-        return err_set(e, "%s: 'scene' or 'engine' is missing", where);
-    if (member_text(c, "error") != NULL)
-        return (!passed && only_time_missing(c)) ||
-               err_set(e, "%s: has an 'error' and yet 'passed' or a 'verdict'", where);
-    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
-        if (!json_is_number(json_object_get(c, numbers[i])))
-            return err_set(e, "%s: '%s' is not a number", where, numbers[i]);
-    if (!json_is_interval(json_object_get(c, "pixels_ci")) ||
-        !json_is_interval(json_object_get(c, "image_range")))
-        return err_set(e, "%s: 'pixels_ci' or 'image_range' is not an interval", where);
-    const json_t *noise = json_object_get(c, "noise"), *early = json_object_get(c, "too_early");
-    if (noise != NULL &&
-        (!json_is_number(noise) || !json_is_interval(json_object_get(c, "noise_ci"))))
-        return err_set(e, "%s: 'noise' is not a number or 'noise_ci' is not an interval", where);
-    if (early != NULL &&
-        (!json_is_integer(early) || !json_is_integer(json_object_get(c, "too_late"))))
-        return err_set(e, "%s: 'too_early' or 'too_late' is not a whole number", where);
-    enum verdict v;
-    const char *verdict = member_text(c, "verdict");
-    if (verdict == NULL || !verdict_parse(verdict, &v) || member_text(c, "reason") == NULL)
-        return err_set(e, "%s: 'verdict' or 'reason' is missing or unknown", where);
-    return passed == (v == VERDICT_EQUIVALENT) ||
-           err_set(e, "%s: 'passed' contradicts 'verdict'", where);
-}
+static const struct shape row_shape = {.names = {[IS_TEXT] = "scene engine error?"}};
+static const struct shape judged_shape = {
+    .names = {[IS_TEXT] = "reason",
+              [IS_NUMBER] = "renders spp alpha margin image seconds",
+              [IS_ESTIMATE] = "pixels noise?",
+              [IS_COUNT] = "too_early? too_late?",
+              [IS_INTERVAL] = "image_range",
+              [IS_VERDICT] = "verdict"}};
 
 bool stated_error_check(const json_t *consistency, const char *path, struct err *e)
 {
@@ -49,7 +21,8 @@ bool stated_error_check(const json_t *consistency, const char *path, struct err 
     for (size_t i = 0; i < json_array_size(consistency); i++) {
         char where[512];
         snprintf(where, sizeof where, "%.400s: consistency %zu", path, i + 1);
-        if (!check_one(json_array_get(consistency, i), where, e))
+        if (!json_shape_check(json_array_get(consistency, i), &row_shape, where, e) ||
+            !json_shape_check_row(json_array_get(consistency, i), &judged_shape, where, e))
             return false;
     }
     return true;

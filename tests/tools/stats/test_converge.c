@@ -585,15 +585,15 @@ TEST(broken_results_are_refused)
     } broken[] = {
         {"scene", "reference", "3", "'reference' is not a string"},
         {"scene", "margin", "\"a\"", "'margin' is not a number"},
-        {"scene", "engines", "[]", "'engines' or 'ratios'"},
-        {"engine", "slope_ci", "[1, 0]", "'slope_ci' is not an interval"},
-        {"engine", "slope_ci", "null", "'slope_ci' is not an interval"},
+        {"scene", "engines", "[]", "'engines' is not an array with at least one"},
+        {"engine", "slope_ci", "[1, 0]", "'slope_ci' is not an array of two numbers"},
+        {"engine", "slope_ci", "null", "'slope_ci' is not an array of two numbers"},
         {"engine", "verdict", "\"GOOD\"", "'verdict' is not a verdict"},
         {"engine", "passed", "false", "contradicts"},
         {"engine", "rungs", "[]", "'rungs' is not an array"},
-        {"rung", "rmse", "0", "'rmse' is not a positive number"},
-        {"rung", "spp", "null", "'spp' is not a positive number"},
-        {"ratio", "variance", "-1", "'variance' is not a positive number"},
+        {"rung", "rmse", "0", "'rungs.rmse' is not a positive number"},
+        {"rung", "spp", "null", "'rungs.spp' is not a positive number"},
+        {"ratio", "variance", "-1", "'ratios.rungs.variance' is not a positive number"},
     };
     for (size_t i = 0; i < COUNT(broken); i++) {
         json_t *scene, *root = results_with(&scene);
