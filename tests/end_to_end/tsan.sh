@@ -50,4 +50,9 @@ timeout --preserve-status -s INT 3 "$tsan/pathtracer" -r 64 64 -s 100000 -t 7 -f
 tell "an interrupted render with progress" $?
 "$tsan/assay" validate -q --pathtracer "$tsan/pathtracer" --threads 7 --only 12_point_plane --out "$tmp/report" >"$tmp/out" 2>&1
 tell "a validation" $?
+for seed in 1 2; do
+    "$tsan/pathtracer" -q -r 64 64 -s 16 --seed $seed -f "$tmp/$seed.exr" reference/scenes/41_cornell.dae
+done
+"$tsan/assay" compare -t 7 --expect "NO DIFFERENCE FOUND" --accept-mdb 1000 "$tmp/1.exr" "$tmp/2.exr" >"$tmp/out" 2>&1
+tell "a comparison" $?
 [ $failures -eq 0 ]

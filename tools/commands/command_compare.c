@@ -106,6 +106,8 @@ static const struct cli_option options[] = {
     {0, "name-a", "NAME", "what page and results call A (its path)", TO(job.name[0])},
     {0, "name-b", "NAME", "the same for B", TO(job.name[1])},
     {0, "json", "FILE", "write the claim as results.json", TO(json)},
+    {'t', "threads", "N", "0: one per processor (0); the same numbers with any",
+     TO(job.opt.threads), 0, 1024},
     {'r', "report", "FILE", "write the claim as one HTML page with its images", TO(report)},
     {'q', "quiet", "", "print nothing; the exit code says it", TO(quiet)},
     {'h', "help", "", "print this", TO(help), .usage = usage},
@@ -113,6 +115,8 @@ static const struct cli_option options[] = {
 
 static bool check(struct settings *s, struct err *e)
 {
+    if (s->job.opt.threads == 0)
+        s->job.opt.threads = cli_processors();
     if (s->num_paths != 2)
         return err_set(e, "compare needs two images (see --help)");
     if (!compare_job_check(&s->job, e))

@@ -15,6 +15,7 @@ struct compare_options {
     double margin_variance; /* relative, of the variance per observation; 0: reported, never tested,
                                as different estimators differ rightly; else its interval must lie
                                inside for EQUIVALENT and NO DIFFERENCE FOUND */
+    int threads;            /* at most so many, of which 5 have work; the same numbers with any */
 };
 
 /* The claim's tests in groups, each with its own part of alpha. */

@@ -1,6 +1,7 @@
 #include "hint.h"
 
 #include "error_modes.h"
+#include "renderer/base/parallel.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -267,7 +268,7 @@ static double removed_by(const struct images *m, enum error_mode_kind kind, doub
 }
 
 /* The amount that removes most: on a grid, then between its neighbours by thirds. */
-static bool fit(struct images *m, enum error_mode_kind kind, double *amount)
+static bool fit(const struct images *m, enum error_mode_kind kind, double *amount)
 {
     static const double reach[NUM_ERROR_MODES] = {[ERROR_SCALE] = 2,
                                                   [ERROR_OFFSET] = 1,
@@ -275,11 +276,11 @@ static bool fit(struct images *m, enum error_mode_kind kind, double *amount)
                                                   [ERROR_SHIFT_X] = GRID,
                                                   [ERROR_SHIFT_Y] = GRID};
     double step = reach[kind] / GRID, best = 0, most = -INFINITY;
-    const struct sample *few = &m->few;
-    if ((kind == ERROR_SHIFT_X || kind == ERROR_SHIFT_Y) && !open_strips(m, kind, &m->few))
+    struct sample few = m->few;
+    if ((kind == ERROR_SHIFT_X || kind == ERROR_SHIFT_Y) && !open_strips(m, kind, &few))
         return false;
     for (int k = -GRID; k <= GRID; k++) {
-        double r = removed_by(m, kind, k * step, few);
+        double r = removed_by(m, kind, k * step, &few);
         if (r > most) {
             most = r;
             best = k * step;
@@ -288,13 +289,12 @@ static bool fit(struct images *m, enum error_mode_kind kind, double *amount)
     double lo = best - step, hi = best + step;
     for (int i = 0; i < REFINE; i++) {
         double third = (hi - lo) / 3;
-        if (removed_by(m, kind, lo + third, few) < removed_by(m, kind, hi - third, few))
+        if (removed_by(m, kind, lo + third, &few) < removed_by(m, kind, hi - third, &few))
             lo += third;
         else
             hi -= third;
     }
-    free(m->few.strips);
-    m->few.strips = NULL;
+    free(few.strips);
     *amount = (lo + hi) / 2;
     return true;
 }
@@ -361,31 +361,55 @@ static void close_images(struct images *m)
 {
     free(m->weight);
     free(m->few.side[0]);
-    free(m->few.strips);
     free(m->many.side[0]);
 }
 
-bool hint_add(const struct moments *a, const struct moments *b, struct comparison *c, struct err *e)
+/* In the order in which they are preferred. */
+static const enum error_mode_kind order[NUM_ERROR_MODES] = {
+    ERROR_FLIP_X,  ERROR_FLIP_Y,  ERROR_ROTATE, ERROR_TRANSPOSE, ERROR_SWAP_RB,
+    ERROR_SWAP_RG, ERROR_SWAP_GB, ERROR_SCALE,  ERROR_OFFSET,    ERROR_GAMMA,
+    ERROR_SHIFT_X, ERROR_SHIFT_Y, ERROR_CLAMP};
+
+/* What is tried on the images, and what came of each. */
+struct trials {
+    const struct images *images;
+    double amount[NUM_ERROR_MODES], share[NUM_ERROR_MODES];
+    bool ok[NUM_ERROR_MODES];
+};
+
+static void try(void *ctx, size_t first, size_t last)
 {
-    static const enum error_mode_kind order[NUM_ERROR_MODES] = {
-        ERROR_FLIP_X,  ERROR_FLIP_Y,  ERROR_ROTATE, ERROR_TRANSPOSE, ERROR_SWAP_RB,
-        ERROR_SWAP_RG, ERROR_SWAP_GB, ERROR_SCALE,  ERROR_OFFSET,    ERROR_GAMMA,
-        ERROR_SHIFT_X, ERROR_SHIFT_Y, ERROR_CLAMP};
+    struct trials *t = ctx;
+    const struct images *m = t->images;
+    for (size_t i = first; i < last; i++) {
+        t->share[i] = 0;
+        t->amount[i] = 0;
+        t->ok[i] = true;
+        if (order[i] == ERROR_TRANSPOSE && m->side[0]->width != m->side[0]->height)
+            continue;
+        t->ok[i] = !error_mode_has_amount(order[i]) || fit(m, order[i], &t->amount[i]);
+        if (t->ok[i])
+            t->share[i] = fmin(1, removed_by(m, order[i], t->amount[i], &m->many));
+    }
+}
+
+bool hint_add(const struct moments *a, const struct moments *b, int threads, struct comparison *c,
+              struct err *e)
+{
     static const double clearly = 0.01; /* more is removed than by what is simpler */
     struct images m;
+    struct trials t = {.images = &m};
     double most = enough_removed - clearly;
     if (c->verdict == VERDICT_EQUIVALENT)
         return true;
     bool ok = open_images(a, b, &m);
+    if (ok)
+        parallel_for(threads, NUM_ERROR_MODES, try, &t);
     for (int i = 0; ok && i < NUM_ERROR_MODES; i++) {
-        if (order[i] == ERROR_TRANSPOSE && a->width != a->height)
-            continue;
-        double amount = 0;
-        ok = !error_mode_has_amount(order[i]) || fit(&m, order[i], &amount);
-        double share = ok ? fmin(1, removed_by(&m, order[i], amount, &m.many)) : 0;
-        if (share >= most + clearly) {
-            most = share;
-            c->hint = describe(order[i], amount, share);
+        ok = t.ok[i];
+        if (ok && t.share[i] >= most + clearly) {
+            most = t.share[i];
+            c->hint = describe(order[i], t.amount[i], t.share[i]);
         }
     }
     close_images(&m);

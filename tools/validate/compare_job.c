@@ -9,6 +9,7 @@
 #include "tools/results/results.h"
 
 #include "renderer/base/fs.h"
+#include "renderer/base/parallel.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -80,21 +81,45 @@ static void make_pairs(struct pair *p, struct notes *notes)
                                 : "--paired: the noise is that of A - B, whatever the sides state");
 }
 
+/* A side as the threads that read them leave it. */
+struct reading {
+    const struct compare_job *job;
+    const char *const *path;
+    const struct input_memory *const *memory;
+    struct pair *pair;
+    struct notes notes[2];
+    struct err err[2];
+    bool ok[2];
+};
+
+static void read_sides(void *ctx, size_t first, size_t last)
+{
+    struct reading *r = ctx;
+    for (size_t i = first; i < last; i++) {
+        struct input_options opt = r->job->input[i];
+        opt.packed = !r->job->paired;
+        const char name = "ab"[i];
+        struct input *in = &r->pair->in[i];
+        if (r->memory[i] != NULL)
+            r->ok[i] =
+                input_take(r->memory[i], r->path[i], name, &opt, in, &r->notes[i], &r->err[i]);
+        else
+            r->ok[i] = input_read(r->path[i], name, &opt, in, &r->notes[i], &r->err[i]);
+    }
+}
+
 static bool pair_read(const struct compare_job *job, const char *const path[2],
                       const struct input_memory *const memory[2], struct pair *p,
                       struct notes *notes, struct err *e)
 {
+    struct reading r = {.job = job, .path = path, .memory = memory, .pair = p};
     *p = (struct pair){0};
+    parallel_for(job->opt.threads, 2, read_sides, &r);
     bool ok = true;
     for (int i = 0; ok && i < 2; i++) {
-        struct input_options opt = job->input[i];
-        opt.packed = !job->paired;
-        const char name = "ab"[i];
-        struct input *in = &p->in[i];
-        if (memory[i] != NULL)
-            ok = input_take(memory[i], path[i], name, &opt, in, notes, e);
-        else
-            ok = input_read(path[i], name, &opt, in, notes, e);
+        for (int k = 0; k < r.notes[i].num; k++)
+            input_notes_add(notes, "%s", r.notes[i].line[k]);
+        ok = r.ok[i] || err_set(e, "%s", r.err[i].msg);
     }
     for (int i = 0; ok && i < 2; i++) /* a curve that nothing is decoded by is a mistake */
         ok = job->input[i].curve == NULL || p->in[0].censored != NULL ||
@@ -327,7 +352,7 @@ bool compare_job_run(const struct compare_job *job, struct compared *out, struct
                             : run_moments;
     bool ok = run(job, out, e);
     if (ok && (!job->same_program || out->has_means))
-        ok = hint_add(&out->m[0], &out->m[1], &out->r, e);
+        ok = hint_add(&out->m[0], &out->m[1], job->opt.threads, &out->r, e);
     if (!ok)
         compare_job_free(out);
     else if (job->accept_mdb[0] > 0 && out->r.verdict == VERDICT_NOTHING_FOUND &&

@@ -329,7 +329,7 @@ static void look(struct validation *v, struct claim_run *t)
     double before_a = t->a->cpu_s, before_b = t->b->cpu_s;
     bool ok = alpha_spending_judge(t->looks, t->next, t->stages, &opt, both_of, &p, &c, &stage, &e);
     if (ok && !hint_add(p.is_estimated ? &p.estimated[0] : &p.image[0]->m,
-                        p.is_estimated ? &p.estimated[1] : &p.image[1]->m, &c, &e)) {
+                        p.is_estimated ? &p.estimated[1] : &p.image[1]->m, 1, &c, &e)) {
         comparison_free(&c);
         ok = false;
     }

@@ -37,7 +37,7 @@ TEST(test_by_hand)
     OWN(moments) a = new_moments(8, 8, "sample"), b = new_moments(8, 8, "replicate");
     set_all(&a, 101, 1.01, 10100, 0);
     set_all(&b, 101, 1, 30300, 0);
-    struct comparison c = compare(&a, &b, (struct compare_options){0.05, 0, 0, 4, 0});
+    struct comparison c = compare(&a, &b, (struct compare_options){0.05, 0, 0, 4, 0, 1});
     for (int i = 0; i < 4; i++) {
         const struct region *r = &c.global[i];
         assert_true(r->x == 0 && r->y == 0 && r->width == 8 && r->height == 8 && r->channel == i);
@@ -79,7 +79,7 @@ TEST(test_by_hand)
     strcpy(b.unit, "exact");
     for (int i = 0; i < 3 * 32; i++)
         a.mean[i] += 0.3;
-    c = compare(&a, &b, (struct compare_options){0.05, 0, 0, 4, 0});
+    c = compare(&a, &b, (struct compare_options){0.05, 0, 0, 4, 0, 1});
     assert_near(c.rms_bias, 0.3 * sqrt(0.5) / 2, 1e-12);
     comparison_free(&c);
 }
@@ -293,7 +293,7 @@ TEST(test_half_pixel_shift)
                 moments_add(&m[i], (size_t)p, (double[3]){value, value, value});
             }
     }
-    struct compare_options opt = {1e-3, 0, 0, 4, 0};
+    struct compare_options opt = {1e-3, 0, 0, 4, 0, 1};
     assert_int_equal(verdict_of(&m[0], &m[1], opt), VERDICT_NOTHING_FOUND);
     OWN(comparison) c = compare(&m[2], &m[0], opt);
     assert_int_equal(c.verdict, VERDICT_DIFFERENT);
@@ -303,8 +303,9 @@ TEST(test_half_pixel_shift)
                 (c.worst.x <= 12 && c.worst.x + c.worst.width > 12));
     /* Inside the margins of an approximate engine the same shift is no EQUIVALENT either: a tile on
      * an edge differs by 10 % or more. */
-    assert_int_not_equal(verdict_of(&m[2], &m[0], (struct compare_options){1e-3, 0.05, 0.06, 4, 0}),
-                         VERDICT_EQUIVALENT);
+    assert_int_not_equal(
+        verdict_of(&m[2], &m[0], (struct compare_options){1e-3, 0.05, 0.06, 4, 0, 1}),
+        VERDICT_EQUIVALENT);
     for (int i = 0; i < 3; i++)
         moments_free(&m[i]);
 }
@@ -314,7 +315,7 @@ TEST(test_half_pixel_shift)
 TEST(test_noise_free)
 {
     OWN(moments) a = new_moments(8, 8, "sample"), b = new_moments(8, 8, "sample");
-    struct compare_options opt = {1e-3, 0, 0, 4, 0}, margin = {1e-3, 0.01, 0.02, 4, 0};
+    struct compare_options opt = {1e-3, 0, 0, 4, 0, 1}, margin = {1e-3, 0.01, 0.02, 4, 0, 1};
     constant(&a, 15, 64);
     constant(&b, 15 * (1 + 3e-6), 64);
     assert_int_equal(verdict_of(&a, &b, opt), VERDICT_NOTHING_FOUND);
@@ -358,7 +359,7 @@ static double most_likely(double n, double m)
  * events may make up for it, and nothing is said; nor where samples differ, or inside the margin. */
 TEST(test_one_value_each)
 {
-    struct compare_options opt = {1e-6, 0, 0, 4, 0}, margin = {1e-6, 0.01, 0.02, 4, 0};
+    struct compare_options opt = {1e-6, 0, 0, 4, 0, 1}, margin = {1e-6, 0.01, 0.02, 4, 0, 1};
     enum { SEEN, BLACK, EXACT, VARIED, INSIDE, FEW, CASES };
     for (int k = 0; k < CASES; k++) {
         OWN(moments) a = new_moments(8, 8, "sample"), b = new_moments(8, 8, "sample");
@@ -397,7 +398,7 @@ TEST(test_one_value_each)
 TEST(test_rounding_noise)
 {
     OWN(moments) a = new_moments(4, 4, "sample"), b = new_moments(4, 4, "sample");
-    struct compare_options opt = {1e-3, 0, 0, 2, 0};
+    struct compare_options opt = {1e-3, 0, 0, 2, 0, 1};
     set_all(&a, 1000, 0.5, 1000 * 2.5e-17, 0);
     set_all(&b, 1000, 0.5 * (1 + 1e-7), 1000 * 2.5e-17, 0);
     assert_int_equal(verdict_of(&a, &b, opt), VERDICT_NOTHING_FOUND);
@@ -419,7 +420,7 @@ TEST(test_skew_guard)
         for (int skewed = 0; skewed < 2; skewed++) {
             double k3 = (skewed ? 2 : 0.001) * v * sqrt(v);
             set_all(&a, n, 1.01, m2, k3 * n * (n - 1) * (n - 2));
-            struct compare_options opt = {1e-3, margin ? 0.001 : 0, margin ? 0.002 : 0, 4, 0};
+            struct compare_options opt = {1e-3, margin ? 0.001 : 0, margin ? 0.002 : 0, 4, 0, 1};
             OWN(comparison) c = compare(&a, &b, opt);
             assert_true(c.skew_limited == (skewed == 1));
             if (skewed) {
@@ -450,7 +451,7 @@ TEST(test_harmless_by_luck)
             a.mean[3 * 100 + c] = 1 - 8 * sqrt(v);
             a.m3[3 * 100 + c] = 0.01 * v * sqrt(v) * scale;
         }
-        OWN(comparison) c = compare(&a, &b, (struct compare_options){1e-3, 0, 0, 8, 0});
+        OWN(comparison) c = compare(&a, &b, (struct compare_options){1e-3, 0, 0, 8, 0, 1});
         assert_int_equal(c.verdict, lucky ? VERDICT_NOTHING_FOUND : VERDICT_DIFFERENT);
         assert_true(lucky || (c.worst.width == 1 &&
                               c.worst.log10_p > log10(2) + log10(gsl_cdf_ugaussian_Q(8))));
@@ -512,7 +513,7 @@ TEST(test_skewed_tile)
     double m2 = v * n * (n - 1);
     constant(&b, 1, 1);
     set_all(&a, n, 1, m2, 0);
-    struct compare_options opt = {1e-3, 0.01, 0.02, 4, 0};
+    struct compare_options opt = {1e-3, 0.01, 0.02, 4, 0, 1};
     OWN(comparison) plain = compare(&a, &b, opt);
     for (int y = 0; y < 4; y++)
         for (int x = 0; x < 4; x++)
@@ -548,11 +549,11 @@ TEST(test_floor)
             a.mean[3 * p + c] = 0.0004;
             b.mean[3 * p + c] = 0;
         }
-    OWN(comparison) c = compare(&a, &b, (struct compare_options){1e-3, 0.04, 0.04, 4, 0});
+    OWN(comparison) c = compare(&a, &b, (struct compare_options){1e-3, 0.04, 0.04, 4, 0, 1});
     assert_near(c.worst_tile.difference, 0.032, 1e-12);
     assert_near(c.relative.data[0], 0.032, 1e-7);
     assert_int_equal(c.verdict, VERDICT_EQUIVALENT);
-    assert_int_equal(verdict_of(&a, &b, (struct compare_options){1e-3, 0.03, 0.03, 4, 0}),
+    assert_int_equal(verdict_of(&a, &b, (struct compare_options){1e-3, 0.03, 0.03, 4, 0, 1}),
                      VERDICT_DIFFERENT);
 }
 
@@ -569,7 +570,7 @@ TEST(test_margin_between)
         for (int p = 0; p < 256; p++)
             for (int c = 0; p % 16 < 8 && p / 16 < 8 && c < 3; c++)
                 a.mean[3 * p + c] = over ? 1.021 : 1.019;
-        OWN(comparison) c = compare(&a, &b, (struct compare_options){1e-3, 0.01, 0.03, 4, 0});
+        OWN(comparison) c = compare(&a, &b, (struct compare_options){1e-3, 0.01, 0.03, 4, 0, 1});
         assert_int_equal(c.verdict, over ? VERDICT_DIFFERENT : VERDICT_EQUIVALENT);
         if (over) {
             assert_near(c.worst.margin, 0.02, 1e-12);
@@ -584,7 +585,7 @@ TEST(test_margin_between)
 TEST(test_extra_factor)
 {
     OWN(moments) a = new_moments(16, 16, "sample"), b = new_moments(16, 16, "sample");
-    struct compare_options opt = {1e-3, 0.02, 0.1, 8, 0};
+    struct compare_options opt = {1e-3, 0.02, 0.1, 8, 0, 1};
     uint64_t seed = 21;
     simulate_pair(&a, &b, LAW_NORMAL, 8, true, &seed);
     OWN(comparison) c = compare(&a, &b, opt);
@@ -616,7 +617,7 @@ TEST(test_nothing_found)
     for (int i = 0; i < 3 * 32 * 32; i++)
         if (i / 3 % 32 < 16 && i / 3 / 32 < 16)
             a.mean[i] = 0.7;
-    OWN(comparison) c = compare(&a, &b, (struct compare_options){1e-6, 0, 0, 16, 0});
+    OWN(comparison) c = compare(&a, &b, (struct compare_options){1e-6, 0, 0, 16, 0, 1});
     assert_int_equal(c.verdict, VERDICT_NOTHING_FOUND);
     assert_true(c.mdb_tile > 0.3 && c.mdb_tile < 8.3 * 0.088);
     char image[32], tile[32], wanted[256];
@@ -624,7 +625,7 @@ TEST(test_nothing_found)
              region_mdb_text(c.mdb_global, image), region_mdb_text(c.mdb_tile, tile));
     assert_non_null(strstr(c.reason, wanted));
     /* 1 % of the image needs (3.1 0.044/0.01)^2 = 190 times the samples: more than is said in numbers. */
-    OWN(comparison) d = compare(&a, &b, (struct compare_options){1e-3, 0.01, 0.9, 16, 0});
+    OWN(comparison) d = compare(&a, &b, (struct compare_options){1e-3, 0.01, 0.9, 16, 0, 1});
     assert_int_equal(d.verdict, VERDICT_INCONCLUSIVE);
     assert_true(d.extra_factor == 100);
     char more[128];
@@ -665,7 +666,7 @@ TEST(test_margin_of_variance)
             constant(&b, 1, 1);
             strcpy(b.unit, "exact");
         }
-        const struct compare_options opt = {1e-3, 0.1, 0.4, 16, cases[i].margin};
+        const struct compare_options opt = {1e-3, 0.1, 0.4, 16, cases[i].margin, 1};
         OWN(comparison) c = compare(&a, &b, opt);
         print_message("%s: %s\n", verdict_name(c.verdict), c.reason);
         assert_int_equal(c.verdict, cases[i].verdict);
@@ -683,7 +684,7 @@ TEST(test_channels)
         a.mean[3 * p] = 1 + 0.1 / 0.2126;
         a.mean[3 * p + 1] = 1 - 0.1 / 0.7152;
     }
-    OWN(comparison) c = compare(&a, &b, (struct compare_options){1e-3, 0.01, 0.02, 4, 0});
+    OWN(comparison) c = compare(&a, &b, (struct compare_options){1e-3, 0.01, 0.02, 4, 0, 1});
     assert_near(c.global[3].difference, 0, 1e-12);
     assert_int_equal(c.verdict, VERDICT_DIFFERENT);
     assert_true(c.worst.channel < 3);
@@ -705,7 +706,7 @@ static void expect(const struct moments *b, struct compare_options opt, const ch
 /* Each fault on its own, in B: refused with its own line. Control: without it, judged. */
 TEST(test_hygiene)
 {
-    const struct compare_options right = {1e-3, 0.01, 0.02, 2, 0};
+    const struct compare_options right = {1e-3, 0.01, 0.02, 2, 0, 1};
     struct compare_options opt = right;
     OWN(moments) b = new_moments(4, 4, "replicate"), tall = new_moments(4, 8, "replicate");
     const struct {

@@ -50,7 +50,7 @@ static struct null_result run_null(const struct null_case *k, uint64_t seed, dou
             simulate(&b, k->law, 1, k->n_b, k->grey, &seed);
         else
             constant(&b, 1, 1);
-        OWN(comparison) c = compare(&a, &b, (struct compare_options){alpha, 0, 0, k->tile, 0});
+        OWN(comparison) c = compare(&a, &b, (struct compare_options){alpha, 0, 0, k->tile, 0, 1});
         bool naive = false;
         for (int t = 0; t < tiles; t++) {
             naive = naive || fabs(c.tile_t[t]) > level;
@@ -128,7 +128,7 @@ TEST(test_power)
 {
     enum { CLAIMS = 1000 };
     OWN(moments) a = new_moments(16, 16, "sample"), b = new_moments(16, 16, "replicate");
-    struct compare_options opt = {alpha, 0, 0, 4, 0};
+    struct compare_options opt = {alpha, 0, 0, 4, 0, 1};
     uint64_t seed = 77;
     double mdb = 0;
     for (int i = 0; i < 20; i++) {
@@ -235,7 +235,7 @@ static struct verdict_rate rate_with_bias(double bias, bool one_tile, bool grey,
 TEST(test_false_equivalent)
 {
     enum { CLAIMS = 2000 };
-    struct compare_options opt = {0.05, 0.03, 0.15, 4, 0};
+    struct compare_options opt = {0.05, 0.03, 0.15, 4, 0, 1};
     const double edge = 1 + 1e-6;
     struct verdict_rate all = rate_with_bias(0.03 * edge, false, true, CLAIMS, opt, 31);
     assert_true(lower_bound(all.equivalent, CLAIMS) <= opt.alpha);

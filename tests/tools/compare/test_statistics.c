@@ -219,6 +219,30 @@ static double bugged(const double *truth, int side, int bug, int x, int y, int c
     }
 }
 
+/* That comparison again on three threads: the same to the bit. */
+static void check_threads(const struct moments *a, const struct moments *b,
+                          const struct comparison *one)
+{
+    struct err e;
+    OWN(comparison)
+    c = compare(a, b, (struct compare_options){.alpha = 1e-3, .tile = 8, .threads = 3});
+    MUST(hint_add(a, b, 3, &c, &e));
+    const size_t tiles = (size_t)c.tiles_x * (size_t)c.tiles_y,
+                 pixels = (size_t)a->width * (size_t)a->height;
+    assert_string_equal(c.reason, one->reason);
+    assert_memory_equal(&c.hint.removed, &one->hint.removed, sizeof c.hint.removed);
+    assert_int_equal(c.num_tests, one->num_tests);
+    for (int s = 0; s < NUM_STATISTICS; s++) {
+        assert_memory_equal(&c.statistic[s].log10_p, &one->statistic[s].log10_p, sizeof(double));
+        assert_string_equal(c.statistic[s].what, one->statistic[s].what);
+    }
+    for (int i = 0; i < 4; i++)
+        assert_memory_equal(&c.global[i].mdb, &one->global[i].mdb, sizeof(double));
+    assert_memory_equal(&c.rms_bias, &one->rms_bias, sizeof c.rms_bias);
+    assert_memory_equal(c.tile_t, one->tile_t, tiles * sizeof *c.tile_t);
+    assert_memory_equal(c.z.data, one->z.data, pixels * sizeof *c.z.data);
+}
+
 /* Thirteen bugs, each with a name; 32 x 32, 5 claims each at alpha = 1e-3: DIFFERENT, and the sentence says
  * what it looks like, in every one. The differences are of many standard errors. Controls: the same
  * image without a bug is not DIFFERENT; a hole in one tile is DIFFERENT and is called none of these, nor is a tint,
@@ -255,9 +279,11 @@ TEST(test_names)
             render(&a, LAW_NORMAL, wrong, N, true, &seed);
             render(&b, LAW_NORMAL, truth, N, true, &seed);
             OWN(comparison) c = compare(&a, &b, (struct compare_options){.alpha = 1e-3, .tile = 8});
-            MUST(hint_add(&a, &b, &c, &e));
-            if (i == 0)
+            MUST(hint_add(&a, &b, 1, &c, &e));
+            if (i == 0) {
                 print_message("%-28s %s\n", name[bug], c.reason);
+                check_threads(&a, &b, &c);
+            }
             char wanted[96];
             snprintf(wanted, sizeof wanted, "looks like %s", name[bug]);
             assert_true((c.verdict == VERDICT_DIFFERENT) == (bug != 13));
@@ -300,7 +326,7 @@ TEST(test_amounts)
                 b.mean[p] += truth[p] - 1;
             }
             OWN(comparison) c = compare(&a, &b, (struct compare_options){.alpha = 0.01, .tile = 8});
-            MUST(hint_add(&a, &b, &c, &e));
+            MUST(hint_add(&a, &b, 1, &c, &e));
             if (c.hint.name != NULL && strcmp(c.hint.name, name[kind]) == 0) {
                 named++;
                 sum += c.hint.amount;
