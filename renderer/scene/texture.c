@@ -1,35 +1,38 @@
 #include "texture.h"
 
+#include <stdint.h>
+
 /* Beyond this many images from the first, float32 tells no texels apart. */
 #define FAR_OUT 1e7f
 
-/* Coordinate x of n texels, folded into the image: 0 .. n, but for TEXTURE_BORDER, which may leave it. */
-static float folded(float x, int n, enum texture_wrap wrap)
-{
-    x = minf(maxf(x, -FAR_OUT), FAR_OUT); /* of NaN, too */
-    switch (wrap) {
-    case TEXTURE_WRAP: x -= floorf(x); break;
-    case TEXTURE_MIRROR:
-        x -= 2 * floorf(0.5f * x);
-        x = x > 1 ? 2 - x : x;
-        break;
-    case TEXTURE_CLAMP: x = minf(1, maxf(0, x)); break;
-    case TEXTURE_BORDER: x = minf(2, maxf(-1, x)); break;
+/* Of u, v, u, v, without a branch: the wraps of neighbouring lookups have nothing to do with each other. */
+typedef float f4 __attribute__((vector_size(16)));
+typedef int32_t i4 __attribute__((vector_size(16)));
+
+/* Coordinates are cut to lo .. hi, then whole periods are taken off (0: none), then what lies beyond the fold is turned back about 1:
+ * 0 .. 1 but for TEXTURE_BORDER, which may leave it. Texels before the first and behind the last: of these bits of the last one's
+ * number, and these; -1 is none. A mirrored neighbour of the outermost texel is that texel. */
+static const struct {
+    float lo, hi, period, inverse, fold;
+    int32_t before, behind, none;
+} wraps[] = {[TEXTURE_WRAP] = {-FAR_OUT, FAR_OUT, 1, 1, 2, -1, 0, 0},
+             [TEXTURE_MIRROR] = {-FAR_OUT, FAR_OUT, 2, 0.5f, 1, 0, -1, 0},
+             [TEXTURE_CLAMP] = {0, 1, 0, 0, 2, 0, -1, 0},
+             [TEXTURE_BORDER] = {-1, 2, 0, 0, 2, 0, 0, -1}};
+#define OF_BOTH(m)                                                                                 \
+    {                                                                                              \
+        wraps[w[0]].m, wraps[w[1]].m, wraps[w[0]].m, wraps[w[1]].m                                 \
     }
-    return x * (float)n;
+
+static inline i4 select4(i4 mask, i4 yes, i4 no)
+{
+    return (yes & mask) | (no & ~mask);
 }
 
-/* The texel of number i, which may be one off the edge (border: n off); -1: none. A mirrored neighbour of the outermost texel is
- * that texel. */
-static int neighbour(int i, int n, enum texture_wrap wrap)
+static inline f4 floor4(f4 x)
 {
-    if (i >= 0 && i < n)
-        return i;
-    if (wrap == TEXTURE_BORDER)
-        return -1;
-    if (wrap == TEXTURE_WRAP)
-        return i < 0 ? n - 1 : 0;
-    return i < 0 ? 0 : n - 1;
+    f4 whole = __builtin_convertvector(__builtin_convertvector(x, i4), f4);
+    return whole + __builtin_convertvector(whole > x, f4);
 }
 
 static rgb texel(const struct texture *t, int i, int j)
@@ -40,20 +43,32 @@ static rgb texel(const struct texture *t, int i, int j)
     return (rgb){p[0], p[1], p[2]};
 }
 
-/* Texels to both sides of a coordinate, and the share of the second. */
+/* Texels to the left, above, to the right and below of a place, and the shares of the latter two. */
 struct between {
-    int texel[2];
-    float share;
+    i4 texel;
+    f4 share;
 };
 
-static struct between place(float x, int n, enum texture_wrap wrap, bool nearest)
+static inline struct between place(const struct texture *t, struct uv uv)
 {
-    float at = folded(x, n, wrap) - (nearest ? 0 : 0.5f), low = floorf(at);
+    const enum texture_wrap *w = t->wrap;
+    const int32_t right = t->width - 1, bottom = t->height - 1;
+    const f4 lo = OF_BOTH(lo), hi = OF_BOTH(hi), period = OF_BOTH(period);
+    const f4 inverse = OF_BOTH(inverse), fold = OF_BOTH(fold);
+    const i4 before = OF_BOTH(before), behind = OF_BOTH(behind), none = OF_BOTH(none);
+    const i4 last = {right, bottom, right, bottom}, second = {0, 0, 1, 1};
+    f4 x = {uv.u, 1 - uv.v, uv.u, 1 - uv.v}; /* rows come from the top */
+    x = (f4)select4(x > lo, (i4)x, (i4)lo);  /* of NaN, too */
+    x = (f4)select4(x < hi, (i4)x, (i4)hi);
+    x -= period * floor4(inverse * x);
+    x = (f4)select4(x > fold, (i4)(2 - x), (i4)x);
+    x = x * __builtin_convertvector(last + 1, f4) - (t->nearest ? 0 : 0.5f);
+    f4 low = floor4(x);
     /* The far edge itself belongs to the last texel. */
-    if (nearest && wrap != TEXTURE_BORDER)
-        low = minf(low, (float)(n - 1));
-    int i = (int)low, next = i + 1;
-    return (struct between){{neighbour(i, n, wrap), neighbour(next, n, wrap)}, at - low};
+    i4 i = __builtin_convertvector(low, i4);
+    i = select4((i > last) & ~none, last, i) + second;
+    i = select4(i > last, (last & behind) | none, select4(i < 0, (last & before) | none, i));
+    return (struct between){i, x - low};
 }
 
 static rgb mix(rgb a, rgb b, float share)
@@ -63,15 +78,13 @@ static rgb mix(rgb a, rgb b, float share)
 
 rgb texture_lookup(const struct texture *t, struct uv at)
 {
-    const struct between x = place(at.u, t->width, t->wrap[0], t->nearest);
-    /* Rows come from the top. */
-    const struct between y = place(1 - at.v, t->height, t->wrap[1], t->nearest);
-    rgb first = texel(t, x.texel[0], y.texel[0]);
+    const struct between b = place(t, at);
+    rgb first = texel(t, b.texel[0], b.texel[1]);
     if (t->nearest)
         return first;
-    return mix(mix(first, texel(t, x.texel[1], y.texel[0]), x.share),
-               mix(texel(t, x.texel[0], y.texel[1]), texel(t, x.texel[1], y.texel[1]), x.share),
-               y.share);
+    return mix(mix(first, texel(t, b.texel[2], b.texel[1]), b.share[0]),
+               mix(texel(t, b.texel[0], b.texel[3]), texel(t, b.texel[2], b.texel[3]), b.share[0]),
+               b.share[1]);
 }
 
 rgb texture_on_triangle(const struct texture *t, const struct uv c[3], float b1, float b2)
