@@ -1,13 +1,13 @@
 #include "truth.h"
 
 #include "truth_ggx.h"
-#include "truth_several_lamps.h"
 #include "truth_lens.h"
-#include "truth_one_lamp.h"
+#include "truth_lamps.h"
 #include "truth_mirrors_and_glass.h"
 #include "truth_sky.h"
 #include "truth_sun.h"
 #include "truth_snell_window.h"
+#include "truth_values.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -25,13 +25,7 @@ static bool fill_furnace(const struct suite_scene *scene, const struct suite_ref
                          struct moments *out, struct err *e)
 {
     double emission[3], albedo[3];
-    json_error_t why;
-    if (json_unpack_ex(ref->values, &why, JSON_STRICT, "{s:[F,F,F], s:[F,F,F]}", "emission",
-                       &emission[0], &emission[1], &emission[2], "albedo", &albedo[0], &albedo[1],
-                       &albedo[2]) != 0)
-        return err_set(e, "%s", why.text);
-    if (!truth_check_triple("emission", emission, HUGE_VAL, e) ||
-        !truth_check_triple("albedo", albedo, 1, e))
+    if (!truth_values_read(ref->values, e, "emission[3]>=0 albedo[3]=0..1", emission, albedo))
         return false;
     size_t pixels = (size_t)out->width * (size_t)out->height;
     for (size_t i = 0; i < 3 * pixels; i++)
@@ -42,8 +36,8 @@ static bool fill_furnace(const struct suite_scene *scene, const struct suite_ref
 static const struct truth_kind furnaces[] = {{"furnace", fill_furnace, true}, {0}};
 
 static const struct truth_kind *const families[] = {
-    furnaces,           truth_one_lamp, truth_several_lamps, truth_lens, truth_mirrors_and_glass,
-    truth_snell_window, truth_ggx,      truth_sky,           truth_sun,  truth_texture};
+    furnaces,  truth_lamps, truth_lens,   truth_mirrors_and_glass, truth_snell_window, truth_ggx,
+    truth_sky, truth_sun,   truth_texture};
 
 static const struct truth_kind *find_kind(const char *name)
 {

@@ -5,7 +5,7 @@
  * kind      "values" in the .json (all keys needed, no others; triples are R, G, B)
  * furnace   emission [W sr^-1 m^-2], albedo
  *
- * The other kinds are listed in truth_one_lamp.h, truth_several_lamps.h, truth_sun.h, truth_lens.h,
+ * The other kinds are listed in truth_lamps.h, truth_sun.h, truth_lens.h,
  * truth_mirrors_and_glass.h, truth_snell_window.h, truth_ggx.h and truth_sky.h, those of truth_texture.c below. */
 #ifndef ASSAY_TRUTH_H
 #define ASSAY_TRUTH_H
@@ -36,9 +36,6 @@ struct truth_kind {
                  struct moments *out, struct err *e);
     bool by_any_filter; /* else of the box of one pixel alone */
 };
-
-/* Fails, naming the channel, unless all three lie in [0, hi]; `hi` may be HUGE_VAL. */
-NODISCARD bool truth_check_triple(const char *name, const double v[3], double hi, struct err *e);
 
 /* Fails unless paths of one bounce, direct light, are counted. */
 NODISCARD bool truth_check_depth(const struct suite_scene *scene, struct err *e);

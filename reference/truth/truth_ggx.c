@@ -1,6 +1,7 @@
 #include "truth_ggx.h"
 
 #include "truth_pixel_mean.h"
+#include "truth_values.h"
 
 #include <gsl/gsl_chebyshev.h>
 #include <gsl/gsl_integration.h>
@@ -134,34 +135,18 @@ static int ggx_radiance(const void *form, const double eye[3], const double d[3]
     return hit;
 }
 
-static bool ggx_values(json_t *values, json_t **view, struct ggx_sphere *s, struct err *e)
-{
-    json_error_t why;
-    if (json_unpack_ex(values, &why, JSON_STRICT,
-                       "{s:o, s:[F,F,F], s:F, s:[F,F,F], s:F, s:[F,F,F], s:[F,F,F]}", "view", view,
-                       "centre", &s->centre[0], &s->centre[1], &s->centre[2], "radius", &s->radius,
-                       "sky", &s->sky[0], &s->sky[1], &s->sky[2], "alpha", &s->alpha, "eta",
-                       &s->eta[0], &s->eta[1], &s->eta[2], "k", &s->k[0], &s->k[1], &s->k[2]) != 0)
-        return err_set(e, "%s", why.text);
-    if (!(s->alpha > 0))
-        return err_set(e, "alpha is %g, not above 0", s->alpha);
-    return truth_check_triple("sky", s->sky, HUGE_VAL, e) &&
-           truth_check_triple("eta", s->eta, HUGE_VAL, e) &&
-           truth_check_triple("k", s->k, HUGE_VAL, e);
-}
-
 static bool fill_sphere(const struct suite_scene *scene, const struct suite_reference *ref,
                         struct moments *out, struct err *e)
 {
     struct ggx_sphere s = {.facets = strcmp(ref->kind, "ggx_sphere") == 0 ? &ggx : &beckmann};
     struct truth_view view;
     double min_cos;
-    json_t *v;
-    if (!ggx_values(ref->values, &v, &s, e) || !truth_view_read(v, scene, &view, e) ||
-        !truth_view_filled(&view, s.centre, s.radius, &min_cos, e))
+    if (!truth_values_read(ref->values, e,
+                           "(view) centre[3] radius>0 sky[3]>=0 alpha>0 eta[3]>=0 k[3]>=0",
+                           s.centre, &s.radius, s.sky, &s.alpha, s.eta, s.k) ||
+        !truth_view_read(ref->values, scene, &view, e) ||
+        !truth_view_filled(&view, s.centre, s.radius, &min_cos, e) || !truth_check_depth(scene, e))
         return false;
-    if (scene->depth < 1)
-        return err_set(e, "depth is %d, but the form needs one bounce", scene->depth);
     bool ok = fit_albedo(&s, min_cos, e) && truth_view_render(&view, ggx_radiance, &s, out, e);
     for (int c = 0; c < 3; c++)
         gsl_cheb_free(s.albedo[c]);

@@ -1,5 +1,7 @@
 #include "truth_lens.h"
 
+#include "truth_values.h"
+
 #include <math.h>
 
 enum { MAX_PANELS = 8 };
@@ -38,22 +40,19 @@ double truth_disc_share_mean(double k0, double a, double b)
            (a * b);
 }
 
-static bool read_panel(json_t *value, const struct suite_scene *s, struct panel *p, struct err *e)
+static bool read_panel(const json_t *value, const struct suite_scene *s, struct panel *p,
+                       struct err *e)
 {
-    json_error_t why;
-    if (json_unpack_ex(value, &why, JSON_STRICT, "{s:[F,F,F], s:F, s:[F,F], s:F}", "radiance",
-                       &p->radiance[0], &p->radiance[1], &p->radiance[2], "distance", &p->distance,
-                       "normal", &p->normal[0], &p->normal[1], "offset", &p->offset) != 0)
-        return err_set(e, "%s", why.text);
-    if (!(p->distance > 0))
-        return err_set(e, "a panel's distance is %g, not in front of the lens", p->distance);
+    if (!truth_values_read(value, e, "radiance[3]>=0 distance>0 normal[2] offset", p->radiance,
+                           &p->distance, p->normal, &p->offset))
+        return false;
     if (p->distance == s->focal_distance)
         return err_set(e, "a panel is in focus");
     if (!(fabs(hypot(p->normal[0], p->normal[1]) - 1) < 1e-9))
         return err_set(e, "a panel's normal is not of unit length");
     if (fabs(p->normal[0]) < min_slope || fabs(p->normal[1]) < min_slope)
         return err_set(e, "a panel's edge is parallel to the image's sides");
-    return truth_check_triple("radiance", p->radiance, HUGE_VAL, e);
+    return true;
 }
 
 /* Share of rays of the pixel whose lower corner in x and y, at distance 1, is (x, y). A ray from the
@@ -73,18 +72,14 @@ static bool fill_lens_steps(const struct suite_scene *scene, const struct suite_
 {
     double background[3], foot_x[2], foot_y[2];
     struct panel panel[MAX_PANELS];
-    json_t *panels;
-    json_error_t why;
-    if (json_unpack_ex(ref->values, &why, JSON_STRICT, "{s:[F,F,F], s:o, s:{s:[F,F], s:[F,F]}}",
-                       "background", &background[0], &background[1], &background[2], "panels",
-                       &panels, "footprint", "x", &foot_x[0], &foot_x[1], "y", &foot_y[0],
-                       &foot_y[1]) != 0)
-        return err_set(e, "%s", why.text);
+    if (!truth_values_read(ref->values, e,
+                           "background[3]>=0 (panels) footprint.x[2] footprint.y[2]", background,
+                           foot_x, foot_y))
+        return false;
+    const json_t *panels = json_object_get(ref->values, "panels");
     size_t num = json_array_size(panels);
     if (num < 1 || num > MAX_PANELS)
         return err_set(e, "panels is not an array of 1 to %d", MAX_PANELS);
-    if (!truth_check_triple("background", background, HUGE_VAL, e))
-        return false;
     if (!(scene->lens_radius > 0 && scene->focal_distance > 0))
         return err_set(e, "the scene has no lens");
     if (foot_x[0] == foot_x[1] || foot_y[0] == foot_y[1])

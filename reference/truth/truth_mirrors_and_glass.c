@@ -1,6 +1,7 @@
 #include "truth_mirrors_and_glass.h"
 
 #include "truth_pixel_mean.h"
+#include "truth_values.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -103,28 +104,18 @@ static double *breaks(const struct truth_mirror_box *b, int depth, int axis, int
     return s;
 }
 
-static bool box_values(json_t *values, struct truth_mirror_box *b, struct err *e)
+static bool box_values(const json_t *values, struct truth_mirror_box *b, struct err *e)
 {
-    json_error_t why;
     double(*l)[3] = b->radiance, (*r)[3] = b->reflectance;
-    if (json_unpack_ex(
-            values, &why, JSON_STRICT,
-            "{s:[F,F], s:[F,F], s:[F,F], s:[F,F,F], s:F, s:[F,F], s:{s:[F,F,F], s:[F,F,F], "
-            "s:[F,F,F]}, s:{s:[F,F,F], s:[F,F,F], s:[F,F,F], s:[F,F,F], s:[F,F,F], s:[F,F,F]}}",
-            "x", &b->x[0], &b->x[1], "y", &b->y[0], &b->y[1], "z", &b->z[0], &b->z[1], "eye",
-            &b->eye[0], &b->eye[1], &b->eye[2], "tan_half", &b->tan_half, "split", &b->split[0],
-            &b->split[1], "radiance", "left_top", &l[0][0], &l[0][1], &l[0][2], "right_top",
-            &l[1][0], &l[1][1], &l[1][2], "left_bottom", &l[2][0], &l[2][1], &l[2][2],
-            "reflectance", "left", &r[0][0], &r[0][1], &r[0][2], "right", &r[1][0], &r[1][1],
-            &r[1][2], "bottom", &r[2][0], &r[2][1], &r[2][2], "top", &r[3][0], &r[3][1], &r[3][2],
-            "end", &r[4][0], &r[4][1], &r[4][2], "back", &r[5][0], &r[5][1], &r[5][2]) != 0)
-        return err_set(e, "%s", why.text);
-    for (int k = 0; k < 3; k++)
-        if (!truth_check_triple("radiance", l[k], HUGE_VAL, e))
-            return false;
-    for (int k = 0; k < 6; k++)
-        if (!truth_check_triple("reflectance", r[k], 1, e))
-            return false;
+    if (!truth_values_read(
+            values, e,
+            "x[2] y[2] z[2] eye[3] tan_half>0 split[2] "
+            "radiance.left_top[3]>=0 radiance.right_top[3]>=0 radiance.left_bottom[3]>=0 "
+            "reflectance.left[3]=0..1 reflectance.right[3]=0..1 reflectance.bottom[3]=0..1 "
+            "reflectance.top[3]=0..1 reflectance.end[3]=0..1 reflectance.back[3]=0..1",
+            b->x, b->y, b->z, b->eye, &b->tan_half, b->split, l[0], l[1], l[2], r[0], r[1], r[2],
+            r[3], r[4], r[5]))
+        return false;
     if (!unpack_range("x", b->x, e) || !unpack_range("y", b->y, e) || !unpack_range("z", b->z, e))
         return false;
     const double *range[3] = {b->x, b->y, b->z};
@@ -134,7 +125,7 @@ static bool box_values(json_t *values, struct truth_mirror_box *b, struct err *e
     for (int k = 0; k < 2; k++)
         if (!(b->split[k] >= range[k][0] && b->split[k] <= range[k][1]))
             return err_set(e, "split[%d] is not inside the end", k);
-    return b->tan_half > 0 || err_set(e, "tan_half is %g, not above 0", b->tan_half);
+    return true;
 }
 
 static bool fill_mirror_box(const struct suite_scene *scene, const struct suite_reference *ref,
@@ -201,18 +192,10 @@ static bool fill_slab(const struct suite_scene *scene, const struct suite_refere
 {
     struct slab s = {.depth = scene->depth};
     struct truth_view view;
-    json_error_t why;
-    json_t *v;
-    if (json_unpack_ex(ref->values, &why, JSON_STRICT, "{s:o, s:F, s:[F,F,F], s:[F,F,F]}", "view",
-                       &v, "ior", &s.n, "front", &s.front[0], &s.front[1], &s.front[2], "behind",
-                       &s.behind[0], &s.behind[1], &s.behind[2]) != 0)
-        return err_set(e, "%s", why.text);
-    if (!truth_view_read(v, scene, &view, e) ||
-        !truth_check_triple("front", s.front, HUGE_VAL, e) ||
-        !truth_check_triple("behind", s.behind, HUGE_VAL, e))
+    if (!truth_values_read(ref->values, e, "(view) ior>1 front[3]>=0 behind[3]>=0", &s.n, s.front,
+                           s.behind) ||
+        !truth_view_read(ref->values, scene, &view, e))
         return false;
-    if (!(s.n > 1))
-        return err_set(e, "ior is %g, not above 1", s.n);
     for (int k = 0; k < 4; k++) {
         double d[3];
         truth_view_direction(&view, k % 2 ? 1 : -1, k / 2 ? 1 : -1, d);
@@ -278,31 +261,20 @@ int truth_glass_sphere_radiance(const void *sphere, const double eye[3], const d
     return id;
 }
 
-static bool sphere_values(json_t *values, json_t **view, struct truth_glass_sphere *s,
-                          struct err *e)
+static bool sphere_values(const json_t *values, struct truth_glass_sphere *s, struct err *e)
 {
-    json_error_t why;
     double(*r)[2] = s->room, (*w)[3] = s->walls;
-    if (json_unpack_ex(
-            values, &why, JSON_STRICT,
-            "{s:o, s:F, s:[F,F,F], s:F, s:{s:[F,F], s:[F,F], s:[F,F]}, s:{s:[F,F,F], s:[F,F,F], "
-            "s:[F,F,F], s:[F,F,F], s:[F,F,F], s:[F,F,F]}}",
-            "view", view, "ior", &s->n, "centre", &s->centre[0], &s->centre[1], &s->centre[2],
-            "radius", &s->radius, "room", "x", &r[0][0], &r[0][1], "y", &r[1][0], &r[1][1], "z",
-            &r[2][0], &r[2][1], "walls", "left", &w[0][0], &w[0][1], &w[0][2], "right", &w[1][0],
-            &w[1][1], &w[1][2], "bottom", &w[2][0], &w[2][1], &w[2][2], "top", &w[3][0], &w[3][1],
-            &w[3][2], "far", &w[4][0], &w[4][1], &w[4][2], "near", &w[5][0], &w[5][1],
-            &w[5][2]) != 0)
-        return err_set(e, "%s", why.text);
-    for (int k = 0; k < 6; k++)
-        if (!truth_check_triple("walls", w[k], HUGE_VAL, e))
-            return false;
+    if (!truth_values_read(values, e,
+                           "(view) ior>1 centre[3] radius>0 room.x[2] room.y[2] room.z[2] "
+                           "walls.left[3]>=0 walls.right[3]>=0 walls.bottom[3]>=0 "
+                           "walls.top[3]>=0 walls.far[3]>=0 walls.near[3]>=0",
+                           &s->n, s->centre, &s->radius, r[0], r[1], r[2], w[0], w[1], w[2], w[3],
+                           w[4], w[5]))
+        return false;
     for (int k = 0; k < 3; k++)
         if (!(s->centre[k] - s->radius > r[k][0] && s->centre[k] + s->radius < r[k][1]))
             return err_set(e, "the sphere is not inside the room");
-    if (!(s->radius > 0))
-        return err_set(e, "radius is %g, not above 0", s->radius);
-    return s->n > 1 || err_set(e, "ior is %g, not above 1", s->n);
+    return true;
 }
 
 static bool fill_sphere(const struct suite_scene *scene, const struct suite_reference *ref,
@@ -312,8 +284,7 @@ static bool fill_sphere(const struct suite_scene *scene, const struct suite_refe
     enum { MAX_DEPTH = 10 };
     struct truth_glass_sphere s = {.depth = scene->depth};
     struct truth_view view;
-    json_t *v;
-    if (!sphere_values(ref->values, &v, &s, e) || !truth_view_read(v, scene, &view, e))
+    if (!sphere_values(ref->values, &s, e) || !truth_view_read(ref->values, scene, &view, e))
         return false;
     double distance2 = 0;
     for (int k = 0; k < 3; k++) {

@@ -1,10 +1,11 @@
 #include "truth_noise.h"
 
+#include "truth_values.h"
+
 #include "renderer/base/isa.h"
 
 #include <assert.h>
 #include <gsl/gsl_integration.h>
-#include <jansson.h>
 #include <math.h>
 #include <stdlib.h>
 
@@ -98,16 +99,13 @@ bool truth_noise(const struct suite_scene *scene, const struct suite_reference *
 {
     double radiance[3], albedo[3];
     struct image_file p = {.width = scene->width, .height = scene->height};
-    json_error_t why;
     if (!suite_noise_is_known(ref->kind))
         return err_set(e, "%s: the noise of '%s' has no closed form", scene->name, ref->kind);
-    if (json_unpack_ex(ref->values, &why, JSON_STRICT,
-                       "{s:[F,F,F], s:[F,F,F], s:F, s:{s:[F,F], s:[F,F]}, s:{s:[F,F], s:[F,F]}}",
-                       "radiance", &radiance[0], &radiance[1], &radiance[2], "albedo", &albedo[0],
-                       &albedo[1], &albedo[2], "height", &p.lamp.height, "emitter", "x",
-                       &p.lamp.ex[0], &p.lamp.ex[1], "z", &p.lamp.ez[0], &p.lamp.ez[1], "footprint",
-                       "x", &p.foot_x[0], &p.foot_x[1], "z", &p.foot_z[0], &p.foot_z[1]) != 0)
-        return err_set(e, "%s: noise: %s", scene->name, why.text);
+    if (!truth_values_read(
+            ref->values, e,
+            "radiance[3]>=0 albedo[3]=0..1 height>0 emitter.x[2] emitter.z[2] footprint.x[2] footprint.z[2]",
+            radiance, albedo, &p.lamp.height, p.lamp.ex, p.lamp.ez, p.foot_x, p.foot_z))
+        return err_prefix(e, "%s: noise", scene->name);
     if (scene->depth != 1)
         return err_set(e, "%s: noise: depth is %d, not 1", scene->name, scene->depth);
     size_t pixels = (size_t)p.width * (size_t)p.height;

@@ -1,5 +1,7 @@
 #include "truth_pixel_mean.h"
 
+#include "truth_values.h"
+
 #include <gsl/gsl_integration.h>
 #include <gsl/gsl_math.h>
 
@@ -13,23 +15,19 @@ static double dot3(const double a[3], const double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-bool truth_view_read(json_t *values, const struct suite_scene *scene, struct truth_view *view,
+bool truth_view_read(const json_t *values, const struct suite_scene *scene, struct truth_view *view,
                      struct err *e)
 {
-    json_error_t why;
-    double *p = view->eye, *r = view->right, *u = view->up, *f = view->forward;
-    if (json_unpack_ex(values, &why, JSON_STRICT,
-                       "{s:[F,F,F], s:[F,F,F], s:[F,F,F], s:[F,F,F], s:F}", "eye", &p[0], &p[1],
-                       &p[2], "right", &r[0], &r[1], &r[2], "up", &u[0], &u[1], &u[2], "forward",
-                       &f[0], &f[1], &f[2], "tan_half", &view->tan_half) != 0)
-        return err_set(e, "view: %s", why.text);
+    double *r = view->right, *u = view->up, *f = view->forward;
+    if (!truth_values_read(json_object_get(values, "view"), e,
+                           "eye[3] right[3] up[3] forward[3] tan_half>0", view->eye, r, u, f,
+                           &view->tan_half))
+        return err_prefix(e, "view");
     const double *axis[3] = {r, u, f};
     for (int i = 0; i < 3; i++)
         for (int k = 0; k <= i; k++)
             if (!(fabs(dot3(axis[i], axis[k]) - (i == k)) < 1e-12))
                 return err_set(e, "view: right, up and forward are not unit and orthogonal");
-    if (!(view->tan_half > 0))
-        return err_set(e, "view: tan_half is %g, not above 0", view->tan_half);
     view->filter = &scene->filter;
     view->edge = 1;
     if (scene->filter.radius > 0)
@@ -301,16 +299,8 @@ bool truth_view_render(const struct truth_view *view, truth_shade *shade, const 
     return ok;
 }
 
-bool truth_check_triple(const char *name, const double v[3], double hi, struct err *e)
-{
-    for (int c = 0; c < 3; c++)
-        if (!(v[c] >= 0 && v[c] <= hi))
-            return err_set(e, "%s[%d] is %g, not in [0, %g]", name, c, v[c], hi);
-    return true;
-}
-
 bool truth_check_depth(const struct suite_scene *scene, struct err *e)
 {
     return scene->depth >= 1 ||
-           err_set(e, "depth is %d, but the form needs direct light (1 or more)", scene->depth);
+           err_set(e, "depth is %d, but the form needs one bounce, direct light", scene->depth);
 }

@@ -17,9 +17,9 @@ struct truth_view {
     double edge; /* largest |u| and |v| that some pixel counts: 1, with a filter more */
 };
 
-/* {"eye": [x,y,z], "right": [..], "up": [..], "forward": [..], "tan_half": t}: these keys, no others;
+/* The "view" of the values, {"eye": [x,y,z], "right": [..], "up": [..], "forward": [..], "tan_half": t}: these keys, no others;
  * the frame orthonormal to 1e-12. The filter is the scene's. */
-NODISCARD bool truth_view_read(json_t *values, const struct suite_scene *scene,
+NODISCARD bool truth_view_read(const json_t *values, const struct suite_scene *scene,
                                struct truth_view *view, struct err *e);
 
 /* Direction of (u, v), unit length. */

@@ -1,6 +1,7 @@
 #include "truth_sky.h"
 
 #include "truth_pixel_mean.h"
+#include "truth_values.h"
 
 #include <gsl/gsl_math.h>
 
@@ -45,21 +46,14 @@ static bool fill_floor(const struct suite_scene *scene, const struct suite_refer
 {
     struct floor_scene s;
     struct truth_view view;
-    json_error_t why;
-    json_t *v;
-    if (json_unpack_ex(ref->values, &why, JSON_STRICT,
-                       "{s:o, s:[F,F,F], s:[F,F,F], s:F, s:{s:F, s:[F,F], s:F}}", "view", &v, "sky",
-                       &s.sky[0], &s.sky[1], &s.sky[2], "albedo", &s.albedo[0], &s.albedo[1],
-                       &s.albedo[2], "floor_edge", &s.edge, "wall", "x", &s.wall_x, "z",
-                       &s.wall_z[0], &s.wall_z[1], "height", &s.height) != 0)
-        return err_set(e, "%s", why.text);
-    if (!truth_view_read(v, scene, &view, e) || !truth_check_triple("sky", s.sky, HUGE_VAL, e) ||
-        !truth_check_triple("albedo", s.albedo, 1, e))
+    if (!truth_values_read(
+            ref->values, e,
+            "(view) sky[3]>=0 albedo[3]=0..1 floor_edge wall.x wall.z[2] wall.height", s.sky,
+            s.albedo, &s.edge, &s.wall_x, s.wall_z, &s.height) ||
+        !truth_view_read(ref->values, scene, &view, e) || !truth_check_depth(scene, e))
         return false;
     if (!(s.height > 0 && s.wall_z[0] < s.wall_z[1]))
         return err_set(e, "the wall has no area");
-    if (scene->depth < 1)
-        return err_set(e, "depth is %d, but the form needs one bounce", scene->depth);
     for (int k = 0; k < 4; k++) {
         double d[3], x, z;
         truth_view_direction(&view, k % 2 ? 1 : -1, k / 2 ? 1 : -1, d);
@@ -99,15 +93,14 @@ double truth_gradient_texel(const struct truth_gradient *g, int channel, int wid
     return v;
 }
 
-bool truth_gradient_read(json_t *values, struct truth_gradient *g, struct err *e)
+bool truth_gradient_read(const json_t *values, struct truth_gradient *g, struct err *e)
 {
-    json_error_t why;
     double(*b)[3] = g->gradient;
-    if (json_unpack_ex(values, &why, 0, "{s:[F,F,F], s:{s:[F,F,F], s:[F,F,F], s:[F,F,F]}}", "mean",
-                       &g->mean[0], &g->mean[1], &g->mean[2], "gradient", "x", &b[0][0], &b[0][1],
-                       &b[0][2], "y", &b[1][0], &b[1][1], &b[1][2], "z", &b[2][0], &b[2][1],
-                       &b[2][2]) != 0)
-        return err_set(e, "%s", why.text);
+    if (!truth_values_read(
+            values, e,
+            "mean[3] gradient.x[3] gradient.y[3] gradient.z[3] (view) (centre) (radius) (albedo)",
+            g->mean, b[0], b[1], b[2]))
+        return false;
     for (int c = 0; c < 3; c++)
         if (!(hypot(hypot(b[0][c], b[1][c]), b[2][c]) < g->mean[c]))
             return err_set(e, "channel %d: the gradient makes radiance negative somewhere", c);
@@ -135,20 +128,14 @@ static bool fill_gradient(const struct suite_scene *scene, const struct suite_re
 {
     struct gradient_sphere s;
     struct truth_view view;
-    json_error_t why;
-    json_t *v, *mean, *gradient;
     double min_cos;
-    if (json_unpack_ex(ref->values, &why, JSON_STRICT, "{s:o, s:[F,F,F], s:F, s:[F,F,F], s:o, s:o}",
-                       "view", &v, "centre", &s.centre[0], &s.centre[1], &s.centre[2], "radius",
-                       &s.radius, "albedo", &s.albedo[0], &s.albedo[1], &s.albedo[2], "mean", &mean,
-                       "gradient", &gradient) != 0)
-        return err_set(e, "%s", why.text);
-    if (!truth_view_read(v, scene, &view, e) || !truth_gradient_read(ref->values, &s.sky, e) ||
-        !truth_check_triple("albedo", s.albedo, 1, e) ||
-        !truth_view_filled(&view, s.centre, s.radius, &min_cos, e))
+    if (!truth_values_read(ref->values, e,
+                           "(view) centre[3] radius>0 albedo[3]=0..1 (mean) (gradient)", s.centre,
+                           &s.radius, s.albedo) ||
+        !truth_gradient_read(ref->values, &s.sky, e) ||
+        !truth_view_read(ref->values, scene, &view, e) ||
+        !truth_view_filled(&view, s.centre, s.radius, &min_cos, e) || !truth_check_depth(scene, e))
         return false;
-    if (scene->depth < 1)
-        return err_set(e, "depth is %d, but the form needs one bounce", scene->depth);
     return truth_view_render(&view, gradient_radiance, &s, out, e);
 }
 

@@ -37,6 +37,6 @@ double truth_gradient_texel(const struct truth_gradient *g, int channel, int wid
                             int col, int row);
 
 /* "mean" and "gradient" of such values; other keys are not looked at. */
-NODISCARD bool truth_gradient_read(json_t *values, struct truth_gradient *g, struct err *e);
+NODISCARD bool truth_gradient_read(const json_t *values, struct truth_gradient *g, struct err *e);
 
 #endif

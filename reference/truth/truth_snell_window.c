@@ -2,6 +2,7 @@
 
 #include "truth_mirrors_and_glass.h"
 #include "truth_pixel_mean.h"
+#include "truth_values.h"
 
 #include <math.h>
 
@@ -33,19 +34,10 @@ static bool fill_window(const struct suite_scene *scene, const struct suite_refe
 {
     struct window w;
     struct truth_view view;
-    json_error_t why;
-    json_t *v;
-    if (json_unpack_ex(ref->values, &why, JSON_STRICT, "{s:o, s:F, s:[F,F,F], s:[F,F,F]}", "view",
-                       &v, "ior", &w.n, "sky", &w.sky[0], &w.sky[1], &w.sky[2], "floor",
-                       &w.floor[0], &w.floor[1], &w.floor[2]) != 0)
-        return err_set(e, "%s", why.text);
-    if (!truth_view_read(v, scene, &view, e) || !truth_check_triple("sky", w.sky, HUGE_VAL, e) ||
-        !truth_check_triple("floor", w.floor, HUGE_VAL, e))
+    if (!truth_values_read(ref->values, e, "(view) ior>1 sky[3]>=0 floor[3]>=0", &w.n, w.sky,
+                           w.floor) ||
+        !truth_view_read(ref->values, scene, &view, e) || !truth_check_depth(scene, e))
         return false;
-    if (!(w.n > 1))
-        return err_set(e, "ior is %g, not above 1", w.n);
-    if (scene->depth < 1)
-        return err_set(e, "depth is %d, but the form needs one bounce", scene->depth);
     if (!(view.eye[1] < 0))
         return err_set(e, "the eye is at height %g, not below the surface", view.eye[1]);
     for (int k = 0; k < 4; k++) {

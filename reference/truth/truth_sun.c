@@ -1,5 +1,7 @@
 #include "truth_sun.h"
 
+#include "truth_values.h"
+
 #include <math.h>
 
 /* Up the normal of the facet between the ridges k and k+1. */
@@ -45,26 +47,16 @@ static bool is_convex(const struct truth_pyramid *p)
 static bool read_pyramid(json_t *values, struct truth_pyramid *p, double irradiance[3],
                          double albedo[3], double centre[2], struct err *e)
 {
-    double(*r)[3] = p->ridge;
-    json_error_t why;
-    if (json_unpack_ex(values, &why, JSON_STRICT,
-                       "{s:[F,F,F], s:[F,F,F], s:[F,F,F], s:[F,F,F],"
-                       " s:[[F,F,F], [F,F,F], [F,F,F], [F,F,F]], s:[F,F]}",
-                       "irradiance", &irradiance[0], &irradiance[1], &irradiance[2], "albedo",
-                       &albedo[0], &albedo[1], &albedo[2], "to_light", &p->to_light[0],
-                       &p->to_light[1], &p->to_light[2], "apex", &p->apex[0], &p->apex[1],
-                       &p->apex[2], "ridges", &r[0][0], &r[0][1], &r[0][2], &r[1][0], &r[1][1],
-                       &r[1][2], &r[2][0], &r[2][1], &r[2][2], &r[3][0], &r[3][1], &r[3][2],
-                       "centre", &centre[0], &centre[1]) != 0)
-        return err_set(e, "%s", why.text);
+    if (!truth_values_read(
+            values, e, "irradiance[3]>=0 albedo[3]=0..1 to_light[3] apex[3] ridges[12] centre[2]",
+            irradiance, albedo, p->to_light, p->apex, p->ridge[0], centre))
+        return false;
     double cosine[4];
     truth_pyramid_cosines(p, cosine);
     for (int k = 0; k < 4; k++)
         if (!(cosine[k] > 0))
             return err_set(e, "the facet behind ridge %d does not face the light", k);
-    return (is_convex(p) || err_set(e, "the pyramid is not convex")) &&
-           truth_check_triple("irradiance", irradiance, HUGE_VAL, e) &&
-           truth_check_triple("albedo", albedo, 1, e);
+    return is_convex(p) || err_set(e, "the pyramid is not convex");
 }
 
 static double clamp01(double x)

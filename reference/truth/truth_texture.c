@@ -1,5 +1,7 @@
 #include "truth.h"
 
+#include "truth_values.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -20,7 +22,7 @@ struct picture {
 struct board {
     double place[4], uv[4], factor[3];
     enum wrap wrap[2];
-    int nearest;
+    bool nearest;
 };
 
 double truth_texel_share(double t, bool nearest)
@@ -118,8 +120,9 @@ static bool read_picture(json_t *rows, struct picture *t, struct err *e)
     return true;
 }
 
-static bool read_wrap(const char *name, enum wrap *out, struct err *e)
+static bool read_wrap(const json_t *value, enum wrap *out, struct err *e)
 {
+    const char *name = json_is_string(value) ? json_string_value(value) : "";
     for (int i = 0; i < NUM_WRAPS; i++)
         if (strcmp(name, wrap_names[i]) == 0) {
             *out = (enum wrap)i;
@@ -128,24 +131,22 @@ static bool read_wrap(const char *name, enum wrap *out, struct err *e)
     return err_set(e, "unknown wrap '%.40s'", name);
 }
 
-static bool read_board(json_t *value, struct board *b, struct err *e)
+static bool read_board(const json_t *value, struct board *b, struct err *e)
 {
-    const char *wrap[2];
-    json_error_t why;
-    if (json_unpack_ex(value, &why, JSON_STRICT,
-                       "{s:[F,F,F,F!], s:[F,F,F,F!], s:[s,s!], s:b, s:[F,F,F!]}", "place",
-                       &b->place[0], &b->place[1], &b->place[2], &b->place[3], "uv", &b->uv[0],
-                       &b->uv[1], &b->uv[2], &b->uv[3], "wrap", &wrap[0], &wrap[1], "nearest",
-                       &b->nearest, "factor", &b->factor[0], &b->factor[1], &b->factor[2]) != 0)
-        return err_set(e, "%s", why.text);
+    const json_t *wrap = json_object_get(value, "wrap");
+    b->nearest = json_is_true(json_object_get(value, "nearest"));
+    if (!truth_values_read(value, e, "place[4] uv[4] (wrap) (nearest) factor[3]>=0", b->place,
+                           b->uv, b->factor) ||
+        !read_wrap(json_array_get(wrap, 0), &b->wrap[0], e) ||
+        !read_wrap(json_array_get(wrap, 1), &b->wrap[1], e))
+        return false;
     for (int k = 0; k < 4; k++)
         if (!(b->place[k] >= 0 && b->place[k] <= 1 && fabs(b->uv[k]) < REACH - 1))
             return err_set(e, "place or uv out of range");
     if (!(b->place[0] < b->place[2] && b->place[1] < b->place[3] && b->uv[0] != b->uv[2] &&
           b->uv[1] != b->uv[3]))
         return err_set(e, "place or uv without an extent");
-    return truth_check_triple("factor", b->factor, HUGE_VAL, e) &&
-           read_wrap(wrap[0], &b->wrap[0], e) && read_wrap(wrap[1], &b->wrap[1], e);
+    return true;
 }
 
 static bool fill_pictures(const struct suite_scene *scene, const struct suite_reference *ref,

@@ -3,7 +3,7 @@
 #include "tests/support/build_scene.h"
 #include "povray_fixture.h"
 
-#include "reference/truth/truth_one_lamp.h"
+#include "reference/truth/truth_lamps.h"
 #include "reference/povray/povray_replicate_parts.h"
 #include "reference/truth/truth.h"
 #include "renderer/base/fs.h"

@@ -4,7 +4,7 @@
 #include "povray_fixture.h"
 
 #include "reference/truth/truth.h"
-#include "reference/truth/truth_one_lamp.h"
+#include "reference/truth/truth_lamps.h"
 #include "renderer/scene/environment.h"
 #include "tests/support/own.h"
 #include "tests/support/test.h"

@@ -2,7 +2,7 @@
  * adaptive quadrature over the emitter, Lambert's polygon formula, conservation of energy. All
  * comparisons use one tolerance, and the same tolerance must reject forms with a known mistake. */
 #include "reference/truth/truth.h"
-#include "reference/truth/truth_one_lamp.h"
+#include "reference/truth/truth_lamps.h"
 #include "tests/support/quadrature.h"
 #include "tests/support/own.h"
 #include "tests/support/test.h"
@@ -317,9 +317,9 @@ static const struct bad {
     {"furnace", "{'emission':[1,1,1],'albedo':[0,0.5,1]}", 0, NULL},
     {"furnace", "{'emission':[1,1,1]}", 1, "albedo"},
     {"furnace", "{'emission':[1,1,1],'albedo':[0,0,0],'extra':1}", 1, "extra"},
-    {"furnace", "{'emission':[1,1],'albedo':[0,0,0]}", 1, "2"},
-    {"furnace", "{'emission':[1,1,1,1],'albedo':[0,0,0]}", 1, "left unpacked"},
-    {"furnace", "{'emission':[1,1,'1'],'albedo':[0,0,0]}", 1, "string"},
+    {"furnace", "{'emission':[1,1],'albedo':[0,0,0]}", 1, "'emission' is not 3 numbers"},
+    {"furnace", "{'emission':[1,1,1,1],'albedo':[0,0,0]}", 1, "'emission' is not 3 numbers"},
+    {"furnace", "{'emission':[1,1,'1'],'albedo':[0,0,0]}", 1, "'emission' is not 3 numbers"},
     {"furnace", "{'emission':[1,1,1],'albedo':[0,0,1.01]}", 1, "albedo[2] is 1.01"},
     {"furnace", "{'emission':[1,-1,1],'albedo':[0,0,0]}", 1, "emission[1] is -1"},
     {"lambda", "{}", 1, "truth 'lambda': unknown closed form"},

@@ -1,6 +1,6 @@
 /* Closed forms of furnaces, spheres, spots and the sun against quadrature of the rendering integral
  * and conservation of energy; each comparison must also reject forms with a known mistake. */
-#include "reference/truth/truth_one_lamp.h"
+#include "reference/truth/truth_lamps.h"
 #include "reference/truth/truth_spot.h"
 #include "reference/truth/truth_sun.h"
 #include "tests/support/quadrature.h"

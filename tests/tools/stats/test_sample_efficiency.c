@@ -1,6 +1,6 @@
 /* Noise by closed form against simulation, and what is judged by it: renders that waste samples, adaptive
  * sampling that stops at the wrong place. Seeds and numbers of trials are fixed; nothing is retried. */
-#include "reference/truth/truth_one_lamp.h"
+#include "reference/truth/truth_lamps.h"
 #include "reference/truth/truth_noise.h"
 #include "renderer/math/sampler.h"
 #include "tools/stats/sample_efficiency.h"

@@ -1,4 +1,4 @@
-/* Closed forms of direct light on a Lambertian plane: one light, nothing in its way.
+/* Closed forms of direct light on a Lambertian plane: nothing is in the way of a lamp.
  *
  * kind                   "values" in the .json (all keys needed, no others; triples are R, G, B)
  * point_over_plane       intensity [W sr^-1], albedo, light [x, height, z], footprint
@@ -7,6 +7,8 @@
  * rectangle_over_plane   radiance [W sr^-1 m^-2], albedo, height, emitter {x: [lo, hi],
  *                        z: [lo, hi]}, footprint
  * sphere_over_plane      radiance [W sr^-1 m^-2], albedo, centre [x, height, z], radius, footprint
+ * lamps_over_plane       albedo, footprint, lamps: 1 to 8 of {radiance, height, x: [lo, hi], z: [lo, hi]}, a
+ *                        rectangle that emits downwards, or {intensity, light}, a point
  *
  * The plane is y = 0. footprint {x: [left, right], z: [top, bottom]} is the part of it that the
  * whole image covers: column 0 begins at x = left, row 0 (the top row) at z = top. The box-filtered
@@ -16,7 +18,7 @@
 
 #include "truth.h"
 
-extern const struct truth_kind truth_one_lamp[]; /* ends with a NULL name */
+extern const struct truth_kind truth_lamps[]; /* ends with a NULL name */
 
 /* Irradiance [W m^-2] at the point (x, 0, z), normal +Y, from an isotropic point light of radiant
  * intensity 1 W/sr at `light`, light[1] > 0: inverse square and cosine law. */
