@@ -369,10 +369,13 @@ static bool look(const struct noise_job *job, int replicates, struct noise_rende
     return ok;
 }
 
-/* Renders with one sampler and judges it by its record. With a budget in two looks, at half of the replicates and at all of
- * them; what is not decided then gets a last look at twice as many, since a few rare events can hide how noisy the others
- * are. Each look has the same part of alpha. */
-static bool judge_ours(const struct noise_job *job, const json_t *stored, double alpha, int looks,
+/* Replicates at each look, which have equal parts of alpha: half of those of the margins, all of them, and for what is still not
+ * decided twice as many, since a few rare events can hide how noisy the others are. */
+enum { LOOKS = 3 };
+static const int looks[LOOKS] = {NOISE_REPLICATES / 2, NOISE_REPLICATES, 2 * NOISE_REPLICATES};
+
+/* Renders with one sampler and judges it by its record. */
+static bool judge_ours(const struct noise_job *job, const json_t *stored, double alpha,
                        json_t *rows, struct err *e)
 {
     const char *engine = ours[job->sobol];
@@ -384,11 +387,10 @@ static bool judge_ours(const struct noise_job *job, const json_t *stored, double
         entry != NULL || err_set(e, "no record of its noise is stored: `make golden` makes it");
     ok = ok && noise_ladder_parse(entry, job->scene, &record, e);
     bool decided = false;
-    for (int k = 1; ok && !decided && k <= looks + 1; k++) {
-        int replicates = k <= looks ? NOISE_REPLICATES * k / looks : job->replicates;
+    for (size_t k = 0; ok && !decided && k < LOOKS; k++) {
         json_decref(row);
         row = NULL;
-        ok = look(job, replicates, &renders, &record, alpha / (looks + 1), &decided, &row, e);
+        ok = look(job, looks[k], &renders, &record, alpha / LOOKS, &decided, &row, e);
     }
     if (ok)
         json_array_append(rows, row);
@@ -443,7 +445,7 @@ json_t *noise_claims_run(const struct validate_options *opt, const struct suite_
                             .unit = &unit,
                             .pathtracer = opt->pathtracer,
                             .dir = dir.s,
-                            .replicates = 2 * NOISE_REPLICATES,
+                            .replicates = looks[LOOKS - 1],
                             .threads = opt->threads,
                             .seed = (uint32_t)opt->seed,
                             .first = FIRST_SEED,
@@ -453,7 +455,7 @@ json_t *noise_claims_run(const struct validate_options *opt, const struct suite_
               noise_ladder_unit(opt->golden_dir, s, 1, &unit, &e);
     for (int sampler = 0; ok && sampler < 2; sampler++) {
         job.sobol = sampler == 1;
-        ok = judge_ours(&job, stored, alpha, opt->budget_s > 0 ? 2 : 1, rows, &e);
+        ok = judge_ours(&job, stored, alpha, rows, &e);
     }
     if (!ok) {
         json_array_clear(rows);

@@ -48,8 +48,7 @@ struct validate_options {
 
 /* What cannot be looked at in parts is judged once, at its declared size: adaptive variants, the further
  * engine (rendered once), and the claims of consistency. Goldens and closed forms do not grow; ours grows
- * by ranges of sample numbers, with --live engines by further replicates. A claim of noise has two looks, at half of its
- * replicates and at all of them.
+ * by ranges of sample numbers, with --live engines by further replicates. A claim of noise has looks of its own.
  *
  * A claim that the budget left undecided is INCONCLUSIVE, with what its last look saw. One that had no look
  * is INCONCLUSIVE with an error line and no numbers; never a pass.
