@@ -136,9 +136,7 @@ double member_end(const json_t *object, const char *name, size_t end)
 
 const json_t *member_named(const json_t *array, const char *name)
 {
-    size_t i;
-    json_t *object;
-    json_array_foreach(array, i, object) {
+    json_each(object, array) {
         if (strcmp(member_or_empty(object, "name"), name) == 0)
             return object;
     }

@@ -43,6 +43,14 @@ NODISCARD char *json_command_line(const char *first, const json_t *words);
 /* Two numbers, the lower first? */
 bool json_is_interval(const json_t *v);
 
+/* One element of an array after the other, as a json_t * of that name. */
+#define json_each(element, array)                                                                  \
+    for (size_t element##_at = 0, element##_on = 1;                                                \
+         element##_on && element##_at < json_array_size(array);                                    \
+         element##_on = !element##_on, element##_at++)                                             \
+        for (json_t * (element) = json_array_get(array, element##_at); element##_on;               \
+             element##_on = !element##_on)
+
 /* A member of an object of which all is known: NULL, "" and 0 where it is absent. */
 const char *member_text(const json_t *object, const char *name);
 const char *member_or_empty(const json_t *object, const char *name);

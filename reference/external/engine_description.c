@@ -336,11 +336,10 @@ static size_t fill_in(const char *text, const struct engine_value *values, char 
 bool engine_argv(const struct engine *en, const char *const *keys,
                  const struct engine_value *values, char ***argv, struct err *e)
 {
-    size_t num = 0, bytes = 0, i;
+    size_t num = 0, bytes = 0;
     const char *missing = NULL;
-    const json_t *arg;
     for (const char *const *key = keys; *key != NULL; key++) {
-        json_array_foreach(json_object_get(en->json, *key), i, arg)
+        json_each(arg, json_object_get(en->json, *key))
             bytes += fill_in(json_string_value(arg), values, NULL, 0, &missing);
         num += json_array_size(json_object_get(en->json, *key));
         if (missing != NULL)
@@ -352,7 +351,7 @@ bool engine_argv(const struct engine *en, const char *const *keys,
         return err_set(e, "%s: out of memory", en->file);
     char *at = (char *)(*argv + num + 1), **next = *argv;
     for (; *keys != NULL; keys++)
-        json_array_foreach(json_object_get(en->json, *keys), i, arg) {
+        json_each(arg, json_object_get(en->json, *keys)) {
             size_t n = fill_in(json_string_value(arg), values, at, bytes, &missing);
             *next++ = at;
             at += n;

@@ -85,9 +85,7 @@ bool diagnose_gather_image(const struct diagnose_gather_options *opt, const char
 static const char *subject_of(const json_t *results)
 {
     static const char *const known[] = {ENGINES_WITH_GOLDENS(ENGINE_WORD) "truth"};
-    size_t i;
-    const json_t *claim;
-    json_array_foreach(json_object_get(results, "claims"), i, claim) {
+    json_each(claim, json_object_get(results, "claims")) {
         const char *a = member_text(claim, "a");
         bool is_known = strncmp(a, ours, strlen(ours)) == 0;
         for (size_t k = 0; k < sizeof known / sizeof *known; k++)
@@ -105,9 +103,7 @@ static bool find_image(const json_t *results, const char *json_path, const struc
     const char *engine = v->variant[0] == '\0'        ? subject
                          : strcmp(subject, ours) == 0 ? v->variant
                                                       : "";
-    size_t i;
-    const json_t *claim;
-    json_array_foreach(json_object_get(results, "claims"), i, claim) {
+    json_each(claim, json_object_get(results, "claims")) {
         const char *file = member_text(json_object_get(claim, "files"), "a");
         if (file == NULL || v->options[0] != NULL ||
             strcmp(member_text(claim, "scene"), v->scene) != 0 ||
@@ -122,9 +118,7 @@ static bool find_image(const json_t *results, const char *json_path, const struc
 
 static void add_consistency(const json_t *results, struct observation *clue)
 {
-    size_t i;
-    const json_t *c;
-    json_array_foreach(json_object_get(results, "consistency"), i, c) {
+    json_each(c, json_object_get(results, "consistency")) {
         if (strcmp(member_text(c, "scene"), clue->view->scene) != 0 ||
             member_text(c, "error") != NULL || clue->view->renders < 4)
             continue;

@@ -102,9 +102,7 @@ void diagnose_print(FILE *f, const struct catalogue *c, const struct observation
         print_views(f, c, clue, num_clues, &d->candidate[0]);
         print_next(f, c, d);
     }
-    size_t i;
-    const json_t *s;
-    json_array_foreach(skipped, i, s)
+    json_each(s, skipped)
         fprintf(f, "not looked at: %s: %s\n", json_string_value(json_object_get(s, "view")),
                 json_string_value(json_object_get(s, "reason")));
 }

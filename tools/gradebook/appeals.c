@@ -110,12 +110,11 @@ static void add_points(json_t *object, double more)
 
 static void decide(const struct appeal *one, const struct rubric_check *c, json_t *grade)
 {
-    size_t i;
-    json_t *part, *check = json_array_get(json_object_get(grade, "checks"), (size_t)one->check);
+    json_t *check = json_array_get(json_object_get(grade, "checks"), (size_t)one->check);
     double more = one->points - member_number(check, "points");
     add_points(check, more);
     add_points(grade, more);
-    json_array_foreach(json_object_get(grade, "parts"), i, part)
+    json_each(part, json_object_get(grade, "parts"))
         if (strcmp(member_or_empty(part, "number"), member_or_empty(check, "part")) == 0)
             add_points(part, more);
     json_object_set_new(check, "share", json_real(c->points > 0 ? one->points / c->points : 1));

@@ -17,9 +17,7 @@ enum { BARS = 20, SLOWEST = 5 };
 static void histogram(FILE *f, const json_t *grades)
 {
     double count[BARS] = {0}, most = 1;
-    size_t i;
-    json_t *g;
-    json_array_foreach(grades, i, g) {
+    json_each(g, grades) {
         double share = member_number(g, "points") / fmax(1e-9, member_number(g, "of"));
         int bar = (int)(share * BARS);
         count[bar < BARS ? bar : BARS - 1]++;
@@ -143,8 +141,6 @@ static void row(FILE *f, const json_t *g, size_t parts)
 static void table(FILE *f, json_t *const *sorted, size_t num)
 {
     const json_t *parts = NULL;
-    size_t k;
-    json_t *p;
     for (size_t i = 0; i < num; i++)
         if (json_array_size(json_object_get(sorted[i], "parts")) > json_array_size(parts))
             parts = json_object_get(sorted[i], "parts");
@@ -153,7 +149,7 @@ static void table(FILE *f, json_t *const *sorted, size_t num)
         "<th scope=\"col\">submission</th><th scope=\"col\" class=\"num\">points</th>"
         "<th scope=\"col\">for you to look at</th><th scope=\"col\">what is wrong</th>",
         f);
-    json_array_foreach(parts, k, p) {
+    json_each(p, parts) {
         html_print(f, "<th scope=\"col\" class=\"num\" title=\"%s\">Part&nbsp;%s</th>",
                    member_text(p, "title"), member_text(p, "number"));
     }
@@ -275,10 +271,10 @@ static void look_alikes(FILE *f, const json_t *grades)
 /* Adds to `group` all that are like i, and what they are like; group[k]: 0 not yet seen, else a number from 1 on. */
 static void join_group(const json_t *grades, size_t i, int number, int *group)
 {
-    size_t k, m;
-    json_t *like, *other;
+    size_t m;
+    json_t *other;
     group[i] = number;
-    json_array_foreach(json_object_get(json_array_get(grades, i), "alike"), k, like) {
+    json_each(like, json_object_get(json_array_get(grades, i), "alike")) {
         json_array_foreach(grades, m, other)
             if (group[m] == 0 &&
                 strcmp(member_or_empty(other, "id"), member_or_empty(like, "id")) == 0)
@@ -304,9 +300,7 @@ static void list_group(FILE *f, const json_t *grades, int number, const int *gro
 static void show_copies(FILE *f, const json_t *grades)
 {
     bool any = false;
-    size_t i;
-    json_t *g;
-    json_array_foreach(grades, i, g) {
+    json_each(g, grades) {
         const json_t *first = json_array_get(json_object_get(g, "copied"), 0);
         if (first == NULL)
             continue;

@@ -28,11 +28,10 @@ static void compare(json_t *list, const char *name, const json_t *was, const jso
 
 json_t *grade_change(const json_t *old, const json_t *grade)
 {
-    size_t i;
-    json_t *c, *list = json_array();
-    json_array_foreach(json_object_get(grade, "checks"), i, c)
+    json_t *list = json_array();
+    json_each(c, json_object_get(grade, "checks"))
         compare(list, member_or_empty(c, "name"), find(old, member_or_empty(c, "name")), c);
-    json_array_foreach(json_object_get(old, "checks"), i, c)
+    json_each(c, json_object_get(old, "checks"))
         if (find(grade, member_or_empty(c, "name")) == NULL)
             compare(list, member_or_empty(c, "name"), c, NULL);
     if (old == NULL || json_array_size(list) == 0) {
@@ -46,13 +45,11 @@ json_t *grade_change(const json_t *old, const json_t *grade)
 void grade_change_text(const json_t *grade, char *out, size_t size)
 {
     const json_t *before = json_object_get(grade, "before");
-    size_t i;
-    json_t *c;
     out[0] = '\0';
     if (json_is_object(before))
         text_append(out, size, "%.2f of %g before", member_number(before, "points"),
                     member_number(before, "of"));
-    json_array_foreach(json_object_get(before, "checks"), i, c) {
+    json_each(c, json_object_get(before, "checks")) {
         char was[32], is[32];
         snprintf(was, sizeof was, "%.2f", member_number(c, "was"));
         snprintf(is, sizeof is, "now %.2f", member_number(c, "is"));

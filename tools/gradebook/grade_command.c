@@ -92,9 +92,8 @@ static void tell(const struct grade_settings *s, int num, const json_t *grade)
 /* How many could not be graded, which is ours to mend; the line is of the first. */
 static size_t in_trouble(const json_t *grades, struct err *e)
 {
-    size_t i, num = 0;
-    json_t *g;
-    json_array_foreach(grades, i, g) {
+    size_t num = 0;
+    json_each(g, grades) {
         const char *why = json_string_value(json_object_get(g, "trouble"));
         if (why != NULL && num++ == 0)
             err_set(e, "%s: %s", member_or_empty(g, "id"), why);
@@ -105,9 +104,8 @@ static size_t in_trouble(const json_t *grades, struct err *e)
 /* How many do. */
 static size_t need_staff(const json_t *grades)
 {
-    size_t i, num = 0;
-    json_t *g;
-    json_array_foreach(grades, i, g) {
+    size_t num = 0;
+    json_each(g, grades) {
         char text[8];
         num += grade_needs(g, text, sizeof text);
     }
@@ -118,10 +116,8 @@ static size_t need_staff(const json_t *grades)
 static void warn_of_strangers(const char *file, const struct appeals *a, const json_t *grades)
 {
     for (int i = 0; i < a->num; i++) {
-        size_t k;
-        json_t *g;
         bool known = false;
-        json_array_foreach(grades, k, g)
+        json_each(g, grades)
             known = known || strcmp(member_or_empty(g, "id"), a->of[i].id) == 0;
         if (!known)
             fprintf(stderr, "%s:%d: there is no submission '%s' here\n", file, a->of[i].line,

@@ -13,9 +13,7 @@ static const struct {
 static bool made_an_image(const json_t *grade)
 {
     const json_t *images = json_object_get(grade, "pictures");
-    size_t i;
-    json_t *p;
-    json_array_foreach(images, i, p)
+    json_each(p, images)
         if (json_is_string(json_object_get(p, "sha256")))
             return true;
     return json_array_size(images) == 0;
@@ -33,9 +31,7 @@ const char *grade_state(const json_t *grade)
 
 bool grade_is_provisional(const json_t *object)
 {
-    size_t i;
-    json_t *c;
-    json_array_foreach(json_object_get(object, "checks"), i, c)
+    json_each(c, json_object_get(object, "checks"))
         if (grade_is_provisional(c))
             return true;
     return json_array_size(json_object_get(object, "checks")) == 0 &&
@@ -46,12 +42,10 @@ bool grade_needs(const json_t *grade, char *text, size_t size)
 {
     const char *state = grade_state(grade),
                *why = member_text(grade, member_text(grade, "trouble") ? "trouble" : "wrong");
-    size_t i;
-    json_t *c;
     text[0] = '\0';
     if (state != NULL || why != NULL)
         text_append(text, size, "%s", why != NULL ? why : state);
-    json_array_foreach(json_object_get(grade, "checks"), i, c) {
+    json_each(c, json_object_get(grade, "checks")) {
         const char *name = member_or_empty(c, "name"), *flag = member_or_empty(c, "flag");
         const char *const what[] = {flag[0] != '\0' ? flag : NULL,
                                     json_is_true(json_object_get(c, "judged")) ? NULL

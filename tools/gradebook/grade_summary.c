@@ -17,13 +17,11 @@ void grade_summary_bug(FILE *f, const json_t *grade)
     const json_t *diagnosis = json_object_get(grade, "diagnosis"),
                  *named = json_object_get(diagnosis, "named");
     const char *located = member_or_empty(grade, "located");
-    size_t i;
-    json_t *b;
     if (json_array_size(named) > 0) {
         fprintf(f, "<div class=\"finding\"><p>This looks like %s:</p><ul>\n",
                 json_array_size(named) > 1 ? "one of these, which these images cannot tell apart"
                                            : "a known mistake");
-        json_array_foreach(named, i, b) {
+        json_each(b, named) {
             html_print(f, "<li><b>%s</b> <span class=\"where\">(%s)</span>", member_text(b, "bug"),
                        member_text(b, "where"));
             if (member_text(b, "and_bug") != NULL)
@@ -54,9 +52,7 @@ void grade_summary_bug(FILE *f, const json_t *grade)
 /* The checks of a part that lost points, as links. */
 static void list_losses(FILE *f, const json_t *grade, bool staff, const char *part)
 {
-    size_t i;
-    json_t *c;
-    json_array_foreach(json_object_get(grade, "checks"), i, c) {
+    json_each(c, json_object_get(grade, "checks")) {
         double lost = member_number(c, "of") - member_number(c, "points");
         if (strcmp(member_or_empty(c, "part"), part) == 0 && grade_summary_shows(c, staff) &&
             lost >= 0.005)
@@ -72,9 +68,7 @@ void grade_summary_parts(FILE *f, const json_t *grade, bool staff)
 {
     const json_t *parts = json_object_get(grade, "parts");
     double most = 1e-9;
-    size_t i;
-    json_t *part;
-    json_array_foreach(parts, i, part)
+    json_each(part, parts)
         if (member_number(part, "of") > most)
             most = member_number(part, "of");
     if (json_array_size(parts) == 0)
@@ -83,7 +77,7 @@ void grade_summary_parts(FILE *f, const json_t *grade, bool staff)
         "<table class=\"parts\"><caption>Where the points went</caption>\n"
         "<thead><tr><th scope=\"col\">Part</th><th scope=\"col\" class=\"num\">Points</th></tr></thead><tbody>\n",
         f);
-    json_array_foreach(parts, i, part) {
+    json_each(part, parts) {
         double of = member_number(part, "of"), points = member_number(part, "points");
         html_print(f, "<tr><th scope=\"row\">%s %s", member_text(part, "number"),
                    member_text(part, "title"));

@@ -89,9 +89,7 @@ static void describe_whole(const json_t *grade, char *out, size_t size)
 static double execution_time(const json_t *grade)
 {
     double sum = 0;
-    size_t i;
-    json_t *p;
-    json_array_foreach(json_object_get(grade, "pictures"), i, p)
+    json_each(p, json_object_get(grade, "pictures"))
         sum += member_number(p, "wall_s");
     return sum;
 }
@@ -145,23 +143,21 @@ static void csv_link_text(FILE *f, const char *text)
 static void write_csv(FILE *f, const json_t *grades)
 {
     const json_t *first = NULL;
-    size_t i, k;
-    json_t *g, *c;
-    json_array_foreach(grades, i, g)
+    json_each(g, grades)
         if (first == NULL && json_array_size(json_object_get(g, "checks")) > 0)
             first = g;
     fputs("id,points,of,remarks", f);
-    json_array_foreach(json_object_get(first, "checks"), k, c) {
+    json_each(c, json_object_get(first, "checks")) {
         fputc(',', f);
         csv_link_text(f, member_or_empty(c, "name"));
     }
     fputs("\r\n", f);
-    json_array_foreach(grades, i, g) {
+    json_each(g, grades) {
         csv_link_text(f, member_or_empty(g, "id"));
         fprintf(f, ",%.2f,%g,", member_number(g, "points"), member_number(g, "of"));
         csv_link_text(f, member_or_empty(g, "trouble")[0] != '\0' ? member_or_empty(g, "trouble")
                                                                   : member_or_empty(g, "wrong"));
-        json_array_foreach(json_object_get(g, "checks"), k, c)
+        json_each(c, json_object_get(g, "checks"))
             fprintf(f, ",%.2f", member_number(c, "points"));
         fputs("\r\n", f);
     }
@@ -176,15 +172,14 @@ static void tap_text(FILE *f, const char *text)
 
 static void write_tap(FILE *f, const json_t *grades)
 {
-    size_t i, k, num = 0;
-    json_t *g, *c;
-    json_array_foreach(grades, i, g) {
+    size_t num = 0;
+    json_each(g, grades) {
         size_t checks = json_array_size(json_object_get(g, "checks"));
         num += checks > 0 ? checks : 1;
     }
     fprintf(f, "TAP version 13\n1..%zu\n", num);
     num = 0;
-    json_array_foreach(grades, i, g) {
+    json_each(g, grades) {
         if (json_array_size(json_object_get(g, "checks")) == 0) {
             fprintf(f, "not ok %zu - ", ++num);
             tap_text(f, member_or_empty(g, "id"));
@@ -192,7 +187,7 @@ static void write_tap(FILE *f, const json_t *grades)
             tap_text(f, member_or_empty(g, "trouble"));
             fputc('\n', f);
         }
-        json_array_foreach(json_object_get(g, "checks"), k, c) {
+        json_each(c, json_object_get(g, "checks")) {
             fprintf(f, "%s %zu - ", is_full(c) ? "ok" : "not ok", ++num);
             tap_text(f, member_or_empty(g, "id"));
             fprintf(f, " %s (%.2f of %g): ", member_or_empty(c, "name"), member_number(c, "points"),
@@ -213,15 +208,15 @@ static void xml_pair(FILE *f, const char *name, const char *value)
 /* As Ant's schema has it, the strictest in use. */
 static void write_junit(FILE *f, const json_t *grades)
 {
-    size_t i, k;
-    json_t *g, *c;
+    size_t i;
+    json_t *g;
     char date[20]; /* without a zone */
     snprintf(date, sizeof date, "%.19s", utc_date_now().s);
     fputs("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n", f);
     json_array_foreach(grades, i, g) {
         size_t failures = 0, errors = member_or_empty(g, "trouble")[0] != '\0',
                checks = json_array_size(json_object_get(g, "checks"));
-        json_array_foreach(json_object_get(g, "checks"), k, c) {
+        json_each(c, json_object_get(g, "checks")) {
             failures += is_judged(c) && !is_full(c);
             errors += !is_judged(c);
         }
@@ -238,7 +233,7 @@ static void write_junit(FILE *f, const json_t *grades)
             xml_pair(f, "message", member_or_empty(g, "trouble"));
             fputs("/></testcase>\n", f);
         }
-        json_array_foreach(json_object_get(g, "checks"), k, c) {
+        json_each(c, json_object_get(g, "checks")) {
             char output[4096];
             describe(c, output, sizeof output);
             fputs("<testcase", f);
@@ -311,10 +306,8 @@ static bool write_file(const char *out, const struct rubric *r, const struct ans
 bool grade_write(const char *out, const struct rubric *r, const struct answer_key *a,
                  const json_t *grades, struct err *e)
 {
-    size_t i;
-    json_t *g;
     bool ok = true;
-    json_array_foreach(grades, i, g) {
+    json_each(g, grades) {
         ok = ok && write_json(fs_path("%s/%s/results.json", out, member_or_empty(g, "id")).s,
                               gradescope(g), e);
         for (int k = 0; ok && pages[k] != NULL; k++)

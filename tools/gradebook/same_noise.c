@@ -140,10 +140,8 @@ double same_noise_bound(double tests, double alpha)
 /* Is it the image of an `equal` check, and did it cost no points? */
 static bool is_right(const json_t *grade, const char *image)
 {
-    size_t i;
-    json_t *c;
     bool asked = false;
-    json_array_foreach(json_object_get(grade, "checks"), i, c) {
+    json_each(c, json_object_get(grade, "checks")) {
         if (strcmp(member_or_empty(c, "kind"), "equal") != 0 ||
             strcmp(member_or_empty(c, "picture"), image) != 0)
             continue;

@@ -140,10 +140,9 @@ static bool show_check(const struct page *p, const json_t *c, struct err *e)
 /* The checks that stand out, or the others. */
 static bool show_checks(const struct page *p, bool out, struct err *e)
 {
-    size_t i, num = 0;
-    json_t *c;
+    size_t num = 0;
     bool ok = true;
-    json_array_foreach(json_object_get(p->grade, "checks"), i, c)
+    json_each(c, json_object_get(p->grade, "checks"))
         num += grade_summary_shows(c, p->staff) && stands_out(p, c) == out;
     if (num == 0)
         return true;
@@ -153,7 +152,7 @@ static bool show_checks(const struct page *p, bool out, struct err *e)
     else
         fprintf(p->f, "<h2>What is right</h2><details><summary>%zu with all points</summary>\n",
                 num);
-    json_array_foreach(json_object_get(p->grade, "checks"), i, c)
+    json_each(c, json_object_get(p->grade, "checks"))
         if (grade_summary_shows(c, p->staff) && stands_out(p, c) == out)
             ok = ok && show_check(p, c, e);
     fputs(out ? "" : "</details>\n", p->f);
@@ -208,10 +207,8 @@ static void fact(FILE *f, const char *what, const char *value)
 
 static void show_runs(const struct page *p)
 {
-    size_t i;
-    json_t *image;
     html_table_open(p->f, NULL, "Images", "image|>runs|>CPU, s|>wall, s|size|ended|said");
-    json_array_foreach(json_object_get(p->grade, "pictures"), i, image) {
+    json_each(image, json_object_get(p->grade, "pictures")) {
         const char *end = member_or_empty(image, "end"), *why = member_or_empty(image, "why");
         bool ran = member_number(image, "wall_s") > 0;
         html_row_open(p->f, strcmp(end, "ok") != 0 || why[0] != '\0', member_text(image, "name"));
@@ -255,8 +252,6 @@ static void show_facts(const struct page *p)
 
 static bool page(const struct page *p, struct err *e)
 {
-    size_t i;
-    json_t *c;
     bool left_out = false;
     html_page_open(p->f, member_or_empty(p->grade, "id"), NULL, 0);
     fputs("<div class=\"grade\">\n", p->f);
@@ -268,7 +263,7 @@ static bool page(const struct page *p, struct err *e)
     bool ok = show_image(p, member_or_empty(p->grade, "located_picture"), NULL, e);
     grade_summary_parts(p->f, p->grade, p->staff);
     ok = ok && show_checks(p, true, e) && show_checks(p, false, e);
-    json_array_foreach(json_object_get(p->grade, "checks"), i, c)
+    json_each(c, json_object_get(p->grade, "checks"))
         left_out |= !grade_summary_shows(c, p->staff);
     if (left_out)
         fputs("<p>Some checks are not shown yet.</p>\n", p->f);

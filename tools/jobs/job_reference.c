@@ -183,9 +183,7 @@ struct gathering {
 static const json_t *entry_of(const struct plan *p, const struct suite_scene *scene,
                               const struct suite_reference *ref)
 {
-    size_t i;
-    json_t *entry;
-    json_array_foreach(json_object_get(p->head, "references"), i, entry)
+    json_each(entry, json_object_get(p->head, "references"))
         if (strcmp(member_text(entry, "scene"), scene->name) == 0 &&
             strcmp(member_text(entry, "engine"), ref->engine) == 0)
             return entry;

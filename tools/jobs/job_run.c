@@ -1,5 +1,6 @@
 #define _GNU_SOURCE
 #include "reference/base/json_file.h"
+#include "reference/base/json_node.h"
 #include "reference/base/process.h"
 #include "renderer/base/fs.h"
 #include "plan.h"
@@ -75,10 +76,9 @@ static bool check_inputs(json_t *inputs, struct err *e)
 static char **command_of(const struct plan *p, const json_t *job, const char *out)
 {
     json_t *run = json_object_get(p->head, "run"), *own = json_object_get(job, "words"),
-           *all = json_array(), *v;
-    size_t i;
+           *all = json_array();
     int num, failed = 0; /* where the path is no UTF-8 */
-    json_array_foreach(run, i, v) {
+    json_each(v, run) {
         const char *word = json_string_value(v);
         if (strcmp(word, "{job}") == 0)
             json_array_extend(all, own);
@@ -94,9 +94,7 @@ static char **command_of(const struct plan *p, const json_t *job, const char *ou
 
 static bool may_end(const struct plan *p, int code)
 {
-    size_t i;
-    json_t *v;
-    json_array_foreach(json_object_get(p->head, "ends"), i, v)
+    json_each(v, json_object_get(p->head, "ends"))
         if (json_integer_value(v) == code)
             return true;
     return false;

@@ -117,9 +117,7 @@ static void add_new(json_t *all, json_t *more)
 {
     const json_t *last = json_array_get(all, json_array_size(all) - 1);
     const char *scene = json_string_value(json_object_get(last, "scene"));
-    size_t i;
-    json_t *entry;
-    json_array_foreach(more, i, entry) {
+    json_each(entry, more) {
         const char *of = json_string_value(json_object_get(entry, "scene"));
         if (scene == NULL || of == NULL || strcmp(scene, of) != 0)
             json_array_append(all, entry);

@@ -1,5 +1,6 @@
 #include "plan.h"
 
+#include "reference/base/json_node.h"
 #include "renderer/image/image_oiio.h"
 #include "renderer/base/fs.h"
 #include "renderer/base/sha256.h"
@@ -189,9 +190,7 @@ bool plan_job(struct plan *p, const char *const *word, int num, const char *cons
 
 bool plan_are_texts(const json_t *array)
 {
-    size_t i;
-    json_t *v;
-    json_array_foreach(array, i, v)
+    json_each(v, array)
         if (!json_is_string(v))
             return false;
     return json_is_array(array);

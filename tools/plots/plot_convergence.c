@@ -19,18 +19,16 @@ static double rung_x(const json_t *engine, const json_t *rung, bool against_time
 static bool find_ends(const json_t *engines, bool against_time, struct plot *p)
 {
     double x0 = INFINITY, x1 = -INFINITY, y0 = INFINITY, y1 = -INFINITY;
-    size_t k, i;
-    const json_t *j, *g;
-    json_array_foreach(engines, k, j) json_array_foreach(json_object_get(j, "rungs"), i, g)
-    {
-        double x = log10(rung_x(j, g, against_time)), y = log10(100 * member_number(g, "rmse"));
-        if (!isfinite(x) || !isfinite(y))
-            continue;
-        x0 = fmin(x0, x);
-        x1 = fmax(x1, x);
-        y0 = fmin(y0, y);
-        y1 = fmax(y1, y);
-    }
+    json_each(j, engines)
+        json_each(g, json_object_get(j, "rungs")) {
+            double x = log10(rung_x(j, g, against_time)), y = log10(100 * member_number(g, "rmse"));
+            if (!isfinite(x) || !isfinite(y))
+                continue;
+            x0 = fmin(x0, x);
+            x1 = fmax(x1, x);
+            y0 = fmin(y0, y);
+            y1 = fmax(y1, y);
+        }
     double dx = 0.06 * (x1 - x0) + 1e-3, dy = 0.06 * (y1 - y0) + 1e-3;
     p->x.lo = pow(10, x0 - dx);
     p->x.hi = pow(10, x1 + dx);
@@ -41,11 +39,8 @@ static bool find_ends(const json_t *engines, bool against_time, struct plot *p)
 
 static void draw_engine(struct plot *p, const json_t *engine, size_t number, bool against_time)
 {
-    size_t i;
-    const json_t *g;
     plot_series(p, number, member_text(engine, "engine"));
-    json_array_foreach(json_object_get(engine, "rungs"), i, g)
-    {
+    json_each(g, json_object_get(engine, "rungs")) {
         double x = rung_x(engine, g, against_time), y = 100 * member_number(g, "rmse");
         if (!(x > 0))
             continue;
@@ -76,16 +71,14 @@ static void write_plot_csv(FILE *f, const json_t *engines, bool against_time)
         against_time
             ? csv_link_open(f, "error_time.csv", "engine,cpu_seconds,rmse,rmse_low,rmse_high")
             : csv_link_open(f, "error_samples.csv", "engine,samples,rmse,rmse_low,rmse_high");
-    size_t k, i;
-    const json_t *j, *g;
-    json_array_foreach(engines, k, j) json_array_foreach(json_object_get(j, "rungs"), i, g)
-    {
-        csv_link_text(&csv, member_text(j, "engine"));
-        csv_link_number(&csv, rung_x(j, g, against_time));
-        csv_link_number(&csv, member_number(g, "rmse"));
-        csv_link_interval(&csv, g, "rmse_ci");
-        csv_link_line(&csv);
-    }
+    json_each(j, engines)
+        json_each(g, json_object_get(j, "rungs")) {
+            csv_link_text(&csv, member_text(j, "engine"));
+            csv_link_number(&csv, rung_x(j, g, against_time));
+            csv_link_number(&csv, member_number(g, "rmse"));
+            csv_link_interval(&csv, g, "rmse_ci");
+            csv_link_line(&csv);
+        }
     csv_link_close(&csv);
 }
 
@@ -106,8 +99,7 @@ void plot_convergence(FILE *f, const json_t *scene, bool against_time)
     fputs("<figure class=\"map\">", f);
     plot_open(&p, "RMSE against %s, both axes logarithmic", what);
     draw_guide(&p, json_array_get(engines, 0), against_time);
-    json_array_foreach(engines, k, j)
-    {
+    json_array_foreach(engines, k, j) {
         if (json_object_get(j, "error") == NULL)
             draw_engine(&p, j, k, against_time);
     }

@@ -10,10 +10,7 @@
 static void draw(FILE *f, const json_t *rungs)
 {
     double right = 1, top = 0;
-    size_t i;
-    const json_t *g;
-    json_array_foreach(rungs, i, g)
-    {
+    json_each(g, rungs) {
         right = fmax(right, member_number(g, "depth"));
         top = fmax(top, fmax(member_number(g, "mean") + 2 * member_number(g, "se"),
                              member_number(g, "truth")));
@@ -28,8 +25,7 @@ static void draw(FILE *f, const json_t *rungs)
         .label = "mean radiance, W sr⁻¹ m⁻²", .hi = top > 0 ? 1.08 * top : 1, .has_grid = true};
     plot_open(&p, "Mean radiance against the greatest number of bounces");
     plot_series(&p, 0, NULL);
-    json_array_foreach(rungs, i, g)
-    {
+    json_each(g, rungs) {
         double x = member_number(g, "depth"), y = member_number(g, "mean"),
                se = member_number(g, "se");
         plot_line_to(&p, x, y);
@@ -38,8 +34,7 @@ static void draw(FILE *f, const json_t *rungs)
     }
     plot_series_end(&p);
     plot_path_open(&p, "expected");
-    json_array_foreach(rungs, i, g)
-    {
+    json_each(g, rungs) {
         if (json_object_get(g, "truth") != NULL)
             plot_path_to(&p, member_number(g, "depth"), member_number(g, "truth"));
     }
@@ -52,8 +47,7 @@ static void write_caption(FILE *f, const json_t *depths)
     const json_t *rungs = json_object_get(depths, "rungs");
     double largest = 0;
     size_t known = 0;
-    for (size_t i = 0; i < json_array_size(rungs); i++) {
-        const json_t *g = json_array_get(rungs, i);
+    json_each(g, rungs) {
         if (json_object_get(g, "truth") == NULL)
             continue;
         double d = member_number(g, "mean") - member_number(g, "truth");

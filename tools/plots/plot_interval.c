@@ -73,8 +73,7 @@ struct p_histogram plot_p_histogram(const json_t *claim, int count[20])
     if (h.num_tiles == 0)
         return h;
     h.bins = h.num_tiles >= 200 ? 20 : 10;
-    for (size_t i = 0; i < json_array_size(log10_p); i++) {
-        const json_t *v = json_array_get(log10_p, i);
+    json_each(v, log10_p) {
         if (!json_is_number(v))
             continue;
         double p = pow(10, fmin(json_number_value(v), 0));

@@ -123,8 +123,7 @@ struct power power_of(const json_t *claim)
     const json_t *statistics = json_object_get(claim, "statistics");
     struct power p = {.margin = member_number(claim, "margin_global")};
     double mdb = member_number(claim, "mdb_global");
-    for (size_t i = 0; i < json_array_size(statistics); i++) {
-        const json_t *s = json_array_get(statistics, i);
+    json_each(s, statistics) {
         double tests = member_number(s, "num_tests");
         double level = member_number(claim, "alpha") * member_number(s, "share") / tests;
         if (strcmp(member_text(s, "name"), "image") == 0 && tests > 0 && level > 0)

@@ -25,8 +25,8 @@ static int most_first(const void *a, const void *b)
 static size_t gather(const json_t *claims, struct bar *bar)
 {
     size_t num = 0;
-    for (size_t i = 0; i < json_array_size(claims); i++) {
-        const json_t *c = json_array_get(claims, i), *r = json_object_get(c, "rays_a");
+    json_each(c, claims) {
+        const json_t *r = json_object_get(c, "rays_a");
         double rays = member_number(r, "rays");
         bool known = false;
         for (size_t k = 0; k < num; k++)

@@ -42,10 +42,9 @@ static void write_csv(FILE *f, const json_t *engines)
     struct csv csv =
         csv_link_open(f, "convergence.csv",
                       "engine,samples,rmse,variance,bias,cpu_s,efficiency,rmse_low,rmse_high");
-    for (size_t k = 0; k < json_array_size(engines); k++) {
-        const json_t *j = json_array_get(engines, k), *rungs = json_object_get(j, "rungs");
-        for (size_t i = 0; i < json_array_size(rungs); i++) {
-            const json_t *g = json_array_get(rungs, i);
+    json_each(j, engines) {
+        const json_t *rungs = json_object_get(j, "rungs");
+        json_each(g, rungs) {
             csv_link_text(&csv, member_text(j, "engine"));
             for (size_t n = 0; n < sizeof number / sizeof *number; n++)
                 csv_link_member(&csv, g, number[n]);
@@ -62,10 +61,9 @@ static void write_rungs(FILE *f, const json_t *scene)
     html_table_open(f, NULL, "Table of rungs",
                     "Engine|>Samples|>RMSE %|>Variance|>RMS bias %|>CPU s|>Efficiency 1/s");
     const json_t *engines = json_object_get(scene, "engines");
-    for (size_t k = 0; k < json_array_size(engines); k++) {
-        const json_t *j = json_array_get(engines, k), *rungs = json_object_get(j, "rungs");
-        for (size_t i = 0; i < json_array_size(rungs); i++) {
-            const json_t *g = json_array_get(rungs, i);
+    json_each(j, engines) {
+        const json_t *rungs = json_object_get(j, "rungs");
+        json_each(g, rungs) {
             html_row_open(f, false, member_text(j, "engine"));
             fprintf(f, "<td class=\"num\">%.0f</td>", member_number(g, "spp"));
             write_number(f, g, "rmse", 100);

@@ -7,8 +7,7 @@
 static size_t count(const json_t *noise, bool good)
 {
     size_t n = 0;
-    for (size_t i = 0; i < json_array_size(noise); i++) {
-        const json_t *row = json_array_get(noise, i);
+    json_each(row, noise) {
         bool judged = member_text(row, "against") != NULL || member_text(row, "error") != NULL;
         n += judged && (!good || noise_results_outcome(row) == OUTCOME_AS_EXPECTED);
     }
@@ -33,8 +32,7 @@ void report_noise(FILE *f, const json_t *noise)
     html_table_open(f, NULL, "Table of noise",
                     "Scene|Engine|Variance of a sample|Of the noisiest tile|Over that of|Slope|"
                     "Efficiency [1/s]|Verdict");
-    for (size_t i = 0; i < json_array_size(noise); i++) {
-        const json_t *row = json_array_get(noise, i);
+    json_each(row, noise) {
         html_row_open(f, noise_results_outcome(row) != OUTCOME_AS_EXPECTED,
                       member_text(row, "scene"));
         for (int c = 1; c < NOISE_COLUMNS; c++) {

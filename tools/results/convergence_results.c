@@ -56,8 +56,7 @@ static bool check_scene(const json_t *s, const char *where, struct err *e)
     if (!json_shape_check(s, &scene_shape, where, e))
         return false;
     const json_t *engines = json_object_get(s, "engines"), *depths = json_object_get(s, "depths");
-    for (size_t i = 0; i < json_array_size(engines); i++) {
-        const json_t *j = json_array_get(engines, i);
+    json_each(j, engines) {
         char inner[600];
         snprintf(inner, sizeof inner, "%.500s, %.60s", where, member_text(j, "engine"));
         if (!json_shape_check_row(j, &measured_shape, inner, e))
@@ -70,8 +69,7 @@ bool convergence_results_check(const json_t *convergence, const char *path, stru
 {
     if (json_array_size(convergence) == 0)
         return err_set(e, "%s: 'convergence' is not an array with at least one scene", path);
-    for (size_t i = 0; i < json_array_size(convergence); i++) {
-        const json_t *s = json_array_get(convergence, i);
+    json_each(s, convergence) {
         const char *scene = member_text(s, "scene");
         char where[512];
         snprintf(where, sizeof where, "%.300s: convergence of %.60s", path,
@@ -178,10 +176,9 @@ static void print_rungs(FILE *f, const json_t *scene)
     fprintf(f, "\n%-17s %6s  %-26s %-26s %8s %9s  %s\n", "engine", "spp", "RMSE % [interval]",
             "variance [interval]", "bias %", "CPU ms", "efficiency 1/s [interval]");
     const json_t *engines = json_object_get(scene, "engines");
-    for (size_t k = 0; k < json_array_size(engines); k++) {
-        const json_t *j = json_array_get(engines, k), *rungs = json_object_get(j, "rungs");
-        for (size_t i = 0; i < json_array_size(rungs); i++) {
-            const json_t *g = json_array_get(rungs, i);
+    json_each(j, engines) {
+        const json_t *rungs = json_object_get(j, "rungs");
+        json_each(g, rungs) {
             char rmse[64], variance[64], efficiency[64];
             snprintf(rmse, sizeof rmse, "%.4g [%.4g, %.4g]", 100 * member_number(g, "rmse"),
                      100 * member_end(g, "rmse_ci", 0), 100 * member_end(g, "rmse_ci", 1));

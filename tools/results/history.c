@@ -177,8 +177,7 @@ static bool gather(struct history *h, struct err *e)
     for (size_t n = 0; n < LISTS * h->num_runs; n++) {
         size_t r = n / LISTS;
         const json_t *claims = list_of(h, r, (int)(n % LISTS));
-        for (size_t i = 0; i < json_array_size(claims); i++) {
-            const json_t *c = json_array_get(claims, i);
+        json_each(c, claims) {
             if (results_claim_outcome(c) == OUTCOME_NOT_JUDGED || json_object_get(c, "ci") == NULL)
                 continue;
             struct history_series *s = series_of(h, c, e);

@@ -67,8 +67,7 @@ enum outcome noise_results_outcome(const json_t *row)
 json_t *noise_results_claims(const json_t *noise)
 {
     json_t *claims = json_array();
-    for (size_t i = 0; i < json_array_size(noise); i++) {
-        const json_t *row = json_array_get(noise, i);
+    json_each(row, noise) {
         const char *against = member_text(row, "against");
         if (against == NULL && member_text(row, "error") == NULL)
             continue;
@@ -166,8 +165,7 @@ void noise_results_cell(const json_t *row, int column, char text[NOISE_CELL])
 /* The reason, of what did not pass. */
 static void print_reasons(FILE *f, const json_t *noise)
 {
-    for (size_t i = 0; i < json_array_size(noise); i++) {
-        const json_t *row = json_array_get(noise, i);
+    json_each(row, noise) {
         if (!json_is_true(json_object_get(row, "passed")) && member_text(row, "reason") != NULL)
             fprintf(f, "\n%s, noise of %s: %s\n", member_text(row, "scene"),
                     member_text(row, "engine"), member_text(row, "reason"));

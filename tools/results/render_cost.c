@@ -34,9 +34,7 @@ static int by_total(const void *a, const void *b)
 int render_cost_gather(const json_t *results, struct scene_cost out[MAX_COSTS])
 {
     int num = 0;
-    size_t i, k;
-    const json_t *c, *look;
-    json_array_foreach(json_object_get(results, "claims"), i, c) {
+    json_each(c, json_object_get(results, "claims")) {
         const json_t *cost = json_object_get(c, "cost_s"), *looks = json_object_get(c, "looks");
         struct scene_cost *e = cost != NULL ? entry(out, &num, member_text(c, "scene")) : NULL;
         if (e == NULL)
@@ -49,7 +47,7 @@ int render_cost_gather(const json_t *results, struct scene_cost out[MAX_COSTS])
         e->looks += (int)json_array_size(looks);
         e->undecided +=
             results_claim_lacks_time(c) || results_claim_outcome(c) == OUTCOME_UNDECIDED;
-        json_array_foreach(looks, k, look)
+        json_each(look, looks)
             e->largest_n = fmax(e->largest_n, is_probe ? 0 : member_number(look, "n_a"));
     }
     for (struct results_walk w = {.results = results, .kind = JUDGED_STATED_ERROR};

@@ -6,8 +6,7 @@
 
 static const json_t *find(const json_t *claims, const char *scene, const char *b)
 {
-    for (size_t i = 0; i < json_array_size(claims); i++) {
-        const json_t *c = json_array_get(claims, i);
+    json_each(c, claims) {
         if (strcmp(member_text(c, "scene"), scene) == 0 &&
             strcmp(member_text(c, "a"), "pathtracer") == 0 && strcmp(member_text(c, "b"), b) == 0)
             return c;
@@ -65,8 +64,7 @@ static void print_claims(FILE *f, const json_t *claims)
 static const json_t *engine_of(const json_t *scene, const char *name)
 {
     const json_t *engines = json_object_get(scene, "engines");
-    for (size_t i = 0; i < json_array_size(engines); i++) {
-        const json_t *e = json_array_get(engines, i);
+    json_each(e, engines) {
         if (strcmp(member_text(e, "engine"), name) == 0 && json_object_get(e, "error") == NULL)
             return e;
     }
@@ -77,8 +75,7 @@ static const json_t *engine_of(const json_t *scene, const char *name)
 static const json_t *ratio_of(const json_t *scene, const char *a, bool last)
 {
     const json_t *ratios = json_object_get(scene, "ratios");
-    for (size_t i = 0; i < json_array_size(ratios); i++) {
-        const json_t *r = json_array_get(ratios, i);
+    json_each(r, ratios) {
         const json_t *rungs = json_object_get(r, "rungs");
         if (strcmp(member_text(r, "a"), a) == 0 &&
             strcmp(member_text(r, "b"), engine_names[0]) == 0)
@@ -132,8 +129,7 @@ static void print_convergence(FILE *f, const json_t *convergence)
         "first | top | Sobol, top | efficiency / %s', Sobol |\n"
         "|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n",
         other, other, other);
-    for (size_t i = 0; i < json_array_size(convergence); i++) {
-        const json_t *scene = json_array_get(convergence, i);
+    json_each(scene, convergence) {
         const json_t *ours = engine_of(scene, "pathtracer");
         const json_t *sobol = engine_of(scene, "pathtracer-sobol");
         fprintf(f, "| %s", member_text(scene, "scene"));

@@ -123,21 +123,20 @@ static void print_line(FILE *f, const json_t *claim, const size_t width[NUM_COLU
 
 static void print_terminal(FILE *f, const json_t *claims)
 {
-    size_t width[NUM_COLUMNS] = {0}, i;
-    const json_t *claim;
+    size_t width[NUM_COLUMNS] = {0};
     for (size_t c = 0; c < NUM_COLUMNS; c++) {
         const struct column *column = &results_columns[c];
         if (column->text == NULL)
             continue;
         width[c] = text_columns(column->text);
-        json_array_foreach(claims, i, claim) {
+        json_each(claim, claims) {
             cell_buffer buffer;
             size_t w = text_columns(cell_text(column, claim, false, buffer));
             width[c] = w > width[c] ? w : width[c];
         }
     }
     print_line(f, NULL, width);
-    json_array_foreach(claims, i, claim)
+    json_each(claim, claims)
         print_line(f, claim, width);
 }
 

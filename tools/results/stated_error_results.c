@@ -61,8 +61,7 @@ void stated_error_print(FILE *f, const json_t *consistency, bool markdown)
                      "sum of all pixels\n(then noise / closed form; pixels that adaptive sampling "
                      "stopped too early + too late)\n",
           f);
-    for (size_t i = 0; i < json_array_size(consistency); i++) {
-        const json_t *c = json_array_get(consistency, i);
+    json_each(c, consistency) {
         if (member_text(c, "error") != NULL) {
             fprintf(f, markdown ? "| %s | | | | | | %s: %s |\n" : "%s  %s: %s\n",
                     member_text(c, "scene"),

@@ -186,14 +186,12 @@ static bool is_wrongly_different(const json_t *claim)
 /* If any of these rows differs, all of them as claims of sides of their own: PROGRAM-KIND, the program in `key`. */
 static void add_sides(json_t *all, const json_t *rows, const char *key, const char *kind)
 {
-    const json_t *c;
-    size_t i;
     bool differs = false;
-    json_array_foreach(rows, i, c)
+    json_each(c, rows)
         differs = differs || is_verdict(c, "verdict", VERDICT_DIFFERENT);
     if (!differs)
         return;
-    json_array_foreach(rows, i, c) {
+    json_each(c, rows) {
         char side[160];
         snprintf(side, sizeof side, "%s-%s", member_text(c, key), kind);
         json_array_append_new(all,
@@ -218,16 +216,14 @@ static json_t *all_claims(const json_t *results)
 static const char *accused(const json_t *claims, size_t *length)
 {
     const char *best = "";
-    size_t i, k;
-    json_t *c, *other;
     int most = 0;
-    json_array_foreach(claims, i, c) {
+    json_each(c, claims) {
         const char *a = member_text(c, "a");
         if (a == NULL)
             continue;
         size_t n = strcspn(a, "-");
         int num = 0;
-        json_array_foreach(claims, k, other) {
+        json_each(other, claims) {
             const char *b = member_text(other, "a");
             num += b != NULL && is_wrongly_different(other) && strcspn(b, "-") == n &&
                    strncmp(a, b, n) == 0;
@@ -247,8 +243,7 @@ static bool collect(const struct suite *suite, struct traits *t, struct err *e)
     uint64_t bits = 0;
     size_t length = 0;
     const char *program = accused(t->json, &length);
-    for (size_t i = 0; i < json_array_size(t->json); i++) {
-        const json_t *c = json_array_get(t->json, i);
+    json_each(c, t->json) {
         const struct suite_scene *s = suite_find(suite, member_text(c, "scene"));
         const char *a = member_text(c, "a");
         bool differs = is_verdict(c, "verdict", VERDICT_DIFFERENT);

@@ -26,16 +26,15 @@ void import_result_print(FILE *f, const json_t *reports)
                                             {"unread_rectangles", "rectangles of light"},
                                             {"unread_environments", "environment"},
                                             {"unread_normals", "normals"}};
-    size_t agree = 0, i;
+    size_t agree = 0;
     long long triangles = 0;
-    const json_t *report;
     const char *absent = json_string_value(json_object_get(json_array_get(reports, 0), "absent"));
     if (absent != NULL) {
         fprintf(f, "Blender's own importer against ours: not checked (%s)\n", absent);
         return;
     }
     fprintf(f, "Blender's own importer against ours:\n");
-    json_array_foreach(reports, i, report) {
+    json_each(report, reports) {
         const char *error = json_string_value(json_object_get(report, "error"));
         const char *what = json_string_value(json_object_get(report, "what"));
         const char *scene = json_string_value(json_object_get(report, "scene"));
@@ -61,9 +60,7 @@ void import_result_print(FILE *f, const json_t *reports)
 int import_result_exit_code(const json_t *reports)
 {
     int code = EXIT_EQUIVALENT;
-    size_t i;
-    const json_t *report;
-    json_array_foreach(reports, i, report) {
+    json_each(report, reports) {
         if (json_object_get(report, "absent") != NULL)
             continue;
         if (!json_is_boolean(json_object_get(report, "agrees")))

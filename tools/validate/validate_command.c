@@ -117,15 +117,14 @@ static bool load_engine(struct validate_command *c, struct err *e)
 
 static void print_not_expressible(const json_t *results)
 {
-    size_t i;
-    const json_t *entry, *margin = json_object_get(results, "engine_margin");
+    const json_t *margin = json_object_get(results, "engine_margin");
     if (margin != NULL)
         printf("%s declares margins of its own, %g %% of an image and %g %% of a tile: %s\n",
                member_or_empty(margin, "engine"), 100 * member_number(margin, "global"),
                100 * member_number(margin, "tile"), member_or_empty(margin, "reason"));
     if (json_object_get(results, "engine_filter") != NULL)
         puts(member_text(results, "engine_filter"));
-    json_array_foreach(json_object_get(results, "not_expressible"), i, entry)
+    json_each(entry, json_object_get(results, "not_expressible"))
         printf("%s cannot express %s: %s\n", member_text(entry, "engine"),
                member_text(entry, "scene"), member_text(entry, "reason"));
 }
