@@ -108,8 +108,8 @@ static bool render_one(struct recording r, json_t **entry, struct err *e)
     const bool is_ours = r.engine < CONVERGE_REFERENCES,
                halves = s->width % 2 == 0 && s->height % 2 == 0 && s->tile % 2 == 0;
     r.shrink = !is_ours && halves ? 2 : 1;
-    if ((r.c->golden == NULL || !noise_ladder_unit(r.c->golden, s, r.shrink, &r.unit, e)) &&
-        !noise_ladder_unit(r.c->out, s, r.shrink, &r.unit, e))
+    if ((r.c->golden == NULL || !noise_ladder_unit(r.c->golden, s, NULL, r.shrink, &r.unit, e)) &&
+        !noise_ladder_unit(r.c->out, s, NULL, r.shrink, &r.unit, e))
         return false;
     bool ok = is_ours ? render_ours(&r, e) : render_reference(&r, e);
     *entry = ok ? entry_json(&r) : NULL;

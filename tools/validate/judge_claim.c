@@ -130,9 +130,10 @@ static json_t *files_of(const struct validation *v, const struct claim_run *t, s
     return files;
 }
 
+/* The claim of noise may want a closed form, too. */
 static void release(struct side *s)
 {
-    if (--s->users == 0)
+    if (--s->users == 0 && s->kind != SIDE_TRUTH)
         side_free(s);
 }
 
@@ -366,7 +367,12 @@ static void look(struct validation *v, struct claim_run *t)
 /* What renders for itself. */
 static void judge_alone(struct validation *v, struct claim_run *t, double deadline)
 {
-    t->result = t->of_noise ? noise_claims_run(v->opt, t->scene, v->alpha, deadline)
+    const struct scene_sides *s = &v->sides[t->scene - v->suite.scene];
+    const struct moments *truth = NULL;
+    for (int k = 0; k < t->scene->num_references; k++)
+        if (s->reference[k].kind == SIDE_TRUTH && s->reference[k].at[0][0].present)
+            truth = &s->reference[k].at[0][0].m;
+    t->result = t->of_noise ? noise_claims_run(v->opt, t->scene, truth, v->alpha, deadline)
                             : stated_error_run(v->opt, t->scene, v->alpha, deadline);
     announce(v, t);
 }

@@ -435,7 +435,7 @@ double noise_claims_samples(const struct suite_scene *s)
 }
 
 json_t *noise_claims_run(const struct validate_options *opt, const struct suite_scene *s,
-                         double alpha, double deadline)
+                         const struct moments *truth, double alpha, double deadline)
 {
     const struct path dir = fs_path("%s/data/%s", opt->out_dir, s->name);
     struct converge_reference unit = {0};
@@ -452,7 +452,7 @@ json_t *noise_claims_run(const struct validate_options *opt, const struct suite_
                             .timeout_s = opt->timeout_s,
                             .deadline = deadline};
     bool ok = stored != NULL && fs_make_dirs(dir.s, &e) &&
-              noise_ladder_unit(opt->golden_dir, s, 1, &unit, &e);
+              noise_ladder_unit(opt->golden_dir, s, truth, 1, &unit, &e);
     for (int sampler = 0; ok && sampler < 2; sampler++) {
         job.sobol = sampler == 1;
         ok = judge_ours(&job, stored, alpha, rows, &e);

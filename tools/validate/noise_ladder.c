@@ -24,17 +24,20 @@ void noise_ladder_free(struct noise_ladder *l)
     *l = (struct noise_ladder){0};
 }
 
-bool noise_ladder_unit(const char *golden_dir, const struct suite_scene *scene, int shrink,
-                       struct converge_reference *out, struct err *e)
+bool noise_ladder_unit(const char *golden_dir, const struct suite_scene *scene,
+                       const struct moments *truth, int shrink, struct converge_reference *out,
+                       struct err *e)
 {
-    const struct suite_reference *truth = suite_reference_of(scene, "truth");
-    struct moments m;
+    const struct suite_reference *form = suite_reference_of(scene, "truth");
+    struct moments m = {0};
     json_t *manifest = NULL;
-    if (truth != NULL ? !truth_render(scene, truth, &m, e)
-                      : !golden_read(golden_dir, scene, &scene->reference[0], &m, &manifest, e))
-        return false;
+    bool ok = truth != NULL || (form != NULL ? truth_render(scene, form, &m, e)
+                                             : golden_read(golden_dir, scene, &scene->reference[0],
+                                                           &m, &manifest, e));
     json_decref(manifest);
-    bool ok = convergence_rate_reference_init(out, &m, shrink, e);
+    if (!ok)
+        return false;
+    ok = convergence_rate_reference_init(out, truth != NULL ? truth : &m, shrink, e);
     moments_free(&m);
     return ok || err_prefix(e, "%s", scene->name);
 }

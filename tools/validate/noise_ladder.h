@@ -41,9 +41,10 @@ struct noise_ladder {
 void noise_ladder_free(struct noise_ladder *l);
 
 /* The unit of a scene at images `shrink` times smaller: its first reference, a closed form before all others; fails where
- * that is not stored. */
+ * that is not stored. truth: the closed form, where it is there already; NULL. */
 NODISCARD bool noise_ladder_unit(const char *golden_dir, const struct suite_scene *scene,
-                                 int shrink, struct converge_reference *out, struct err *e);
+                                 const struct moments *truth, int shrink,
+                                 struct converge_reference *out, struct err *e);
 
 /* "pathtracer" or "pathtracer-sobol", by running the program. */
 struct noise_job {

@@ -142,8 +142,9 @@ json_t *stated_error_run(const struct validate_options *opt, const struct suite_
  * (noise_ladder_is_kept()). */
 double noise_claims_samples(const struct suite_scene *s);
 /* Renders the ladders of ours below out_dir and judges them; rows of "noise" (noise_results.h), those of other engines as
- * they are stored behind ours. A new reference; NULL only out of memory. deadline as above. */
+ * they are stored behind ours. truth: the scene's closed form, where it is there already; NULL. A new reference; NULL only out
+ * of memory. deadline as above. */
 json_t *noise_claims_run(const struct validate_options *opt, const struct suite_scene *s,
-                         double alpha, double deadline);
+                         const struct moments *truth, double alpha, double deadline);
 
 #endif
