@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 json_t *json_read(const char *path, size_t flags, json_error_t *why)
 {
@@ -30,6 +31,18 @@ json_t *json_read_or_say(const char *path, struct err *e)
     else if (root == NULL)
         err_set(e, "%s: %s", path, why.text);
     return root;
+}
+
+json_t *json_read_object(const char *path, struct err *e)
+{
+    if (access(path, F_OK) != 0)
+        return json_object();
+    json_t *all = json_read_or_say(path, e);
+    if (all == NULL || json_is_object(all))
+        return all;
+    err_set(e, "%s: not a JSON object", path);
+    json_decref(all);
+    return NULL;
 }
 
 bool json_write_as(const char *path, const json_t *root, size_t flags, struct err *e)

@@ -12,6 +12,9 @@ json_t *json_read(const char *path, size_t flags, json_error_t *why);
 /* The same without duplicates among members; NULL with a line, "FILE:LINE: why", or "FILE: why" where it cannot be opened. */
 json_t *json_read_or_say(const char *path, struct err *e);
 
+/* The object in it; an empty one if there is no file. */
+json_t *json_read_object(const char *path, struct err *e);
+
 /* Writes by rename, indented, with a final newline; makes the directories above it. */
 NODISCARD bool json_write(const char *path, const json_t *root, struct err *e);
 /* The same with flags of json_dumps(), in a directory that is there. */

@@ -25,20 +25,6 @@ static struct place find_place(const char *golden_dir, const char *scene, const 
                           .manifest = fs_path("%s/%s/manifest.json", golden_dir, scene)};
 }
 
-/* The manifest's object; an empty one if there is no file. */
-static json_t *load_manifest(const char *path, struct err *e)
-{
-    if (access(path, F_OK) != 0)
-        return json_object();
-    json_t *all = json_read_or_say(path, e);
-    if (all != NULL && !json_is_object(all)) {
-        err_set(e, "%s: not a JSON object", path);
-        json_decref(all);
-        all = NULL;
-    }
-    return all;
-}
-
 /* Held while the manifest is read, changed and renamed, so that engines of one scene may finish at
  * the same time. Close the descriptor to let go. */
 static int lock_directory(const char *golden_dir, const char *scene, struct err *e)
@@ -104,7 +90,7 @@ bool golden_settle(const char *golden_dir, const char *scene, const char *engine
     int lock = lock_directory(golden_dir, scene, e);
     if (lock < 0)
         return false;
-    json_t *all = load_manifest(at.manifest.s, e);
+    json_t *all = json_read_object(at.manifest.s, e);
     bool ok = all != NULL && settle(json_object_get(all, engine), at.exr.s, at.next.s, e);
     json_decref(all);
     close(lock);
@@ -121,7 +107,7 @@ bool golden_write(const char *golden_dir, const char *scene, const char *engine,
     int lock = lock_directory(golden_dir, scene, e);
     if (lock < 0)
         return false;
-    json_t *all = load_manifest(at.manifest.s, e), *entry = json_copy(manifest);
+    json_t *all = json_read_object(at.manifest.s, e), *entry = json_copy(manifest);
     const struct image_attr attrs[] = {{"assay:scene", scene}, {"assay:engine", engine}};
     bool ok = all != NULL && settle(json_object_get(all, engine), at.exr.s, at.next.s, e);
     bool waits = ok && moments_write(at.next.s, m, attrs, 2, e);
@@ -149,7 +135,7 @@ bool golden_remove(const char *golden_dir, const char *scene, const char *engine
     int lock = lock_directory(golden_dir, scene, e);
     if (lock < 0)
         return false;
-    json_t *all = load_manifest(at.manifest.s, e);
+    json_t *all = json_read_object(at.manifest.s, e);
     bool ok = all != NULL;
     if (ok && json_object_del(all, engine) == 0)
         ok = json_write(at.manifest.s, all, e);
@@ -255,7 +241,7 @@ void golden_inspect(const char *golden_dir, const struct suite_scene *scene,
     char where[PATH_MAX + 64];
     *out = (struct golden){.state = GOLDEN_DAMAGED};
     struct err *e = &out->why;
-    json_t *all = load_manifest(at.manifest.s, e);
+    json_t *all = json_read_object(at.manifest.s, e);
     if (all == NULL)
         return;
     snprintf(where, sizeof where, "%s: %s", at.manifest.s, ref->engine);
@@ -283,7 +269,7 @@ bool golden_is_there(const char *golden_dir, const struct suite_scene *scene,
 {
     struct err ignored;
     json_t *all =
-        load_manifest(find_place(golden_dir, scene->name, ref->engine).manifest.s, &ignored);
+        json_read_object(find_place(golden_dir, scene->name, ref->engine).manifest.s, &ignored);
     const bool there = all == NULL || json_is_object(json_object_get(all, ref->engine));
     json_decref(all);
     return there;
@@ -349,11 +335,10 @@ static bool add_orphans(const char *golden_dir, const struct suite *suite, const
         json_object_set_new(found, name, json_true());
     }
     closedir(d);
-    json_t *all = load_manifest(fs_path("%s/manifest.json", dir.s).s, e);
+    json_t *all = json_read_object(fs_path("%s/manifest.json", dir.s).s, e);
     const char *engine;
     json_t *value;
-    json_object_foreach(all, engine, value)
-    {
+    json_object_foreach(all, engine, value) {
         snprintf(name, sizeof name, "%s/%s", scene, engine);
         if (!is_wanted(suite, scene, engine))
             json_object_set_new(found, name, json_true());

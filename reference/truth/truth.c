@@ -9,7 +9,6 @@
 #include "truth_snell_window.h"
 #include "truth_values.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <string.h>
 

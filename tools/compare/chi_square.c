@@ -3,7 +3,6 @@
 #include "tools/stats/distributions.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* The square of a region's excess over its margin, as of a standard normal law. Where the bias is

@@ -3,7 +3,6 @@
 #include "variance_ratio.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 static const double floor_fraction = 0.05; /* of the mean luminance of B */

@@ -156,15 +156,12 @@ static bool check(const struct replicate_dir *a, const struct replicate_dir *b, 
     if (a->width != b->width || a->height != b->height)
         return err_set(e, "A is %d x %d pixels, B is %d x %d", a->width, a->height, b->width,
                        b->height);
-    size_t bytes = 3 * (size_t)a->width * (size_t)a->height * sizeof **a->rgb;
-    for (int i = 0; i < a->num; i++)
-        for (int j = 0; j < b->num; j++)
-            if (memcmp(a->rgb[i], b->rgb[j], bytes) == 0)
-                return err_set(e,
-                               "%s of A and %s of B are the same image: exchangeable replicates "
-                               "need seeds of their own",
-                               a->name[i], b->name[j]);
-    return true;
+    int i, j;
+    return !replicate_dir_share(a, b, &i, &j) ||
+           err_set(e,
+                   "%s of A and %s of B are the same image: exchangeable replicates need seeds of "
+                   "their own",
+                   a->name[i], b->name[j]);
 }
 
 static void describe(const struct permutation_table *t, size_t r, struct permutation *out)

@@ -6,7 +6,6 @@
 #include <assert.h>
 #include <gsl/gsl_sf_erf.h>
 #include <math.h>
-#include <stdlib.h>
 
 enum { MAX_SIDES = 64 };
 const char *const sign_flip_score_name[NUM_SIGN_FLIP_SCORES] = {"level", "mean", "spread"};

@@ -3,17 +3,14 @@
 #include "reference/base/json_node.h"
 #include "reference/base/utc_date.h"
 #include "reference/suite/engine_table.h"
-#include "renderer/base/fs.h"
 #include "renderer/base/progress.h"
 #include "renderer/base/version.h"
 #include "tools/converge/converge_engine.h"
-#include "tools/results/claim_result.h"
 #include "tools/validate/noise_ladder.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 /* Ours with both samplers, and the engines that the scene has references of. */
 static bool is_of(const struct suite_scene *scene, enum converge_engine engine)

@@ -1,7 +1,6 @@
 #include "grade_images.h"
 #include "student_page.h"
 
-#include "tools/html/html.h"
 #include "tools/plots/plot.h"
 #include "tools/results/results.h"
 

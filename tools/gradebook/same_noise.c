@@ -1,11 +1,9 @@
 #include "same_noise.h"
 
 #include "renderer/base/fs.h"
-#include "student_page.h"
 #include "tools/results/results.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 

@@ -5,7 +5,6 @@
 
 #include <dirent.h>
 #include <errno.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -92,6 +91,17 @@ void replicate_dir_free(struct replicate_dir *r)
     free(r->name);
     free(r->rgb);
     *r = (struct replicate_dir){0};
+}
+
+bool replicate_dir_share(const struct replicate_dir *a, const struct replicate_dir *b, int *i,
+                         int *j)
+{
+    size_t bytes = 3 * (size_t)a->width * (size_t)a->height * sizeof **a->rgb;
+    for (*i = 0; *i < a->num; ++*i)
+        for (*j = 0; *j < b->num; ++*j)
+            if (memcmp(a->rgb[*i], b->rgb[*j], bytes) == 0)
+                return true;
+    return false;
 }
 
 bool replicate_dir_moments(const struct replicate_dir *r, struct moments *out, struct err *e)

@@ -16,6 +16,10 @@ struct replicate_dir {
 NODISCARD bool replicate_dir_read(const char *dir, struct replicate_dir *out, struct err *e);
 void replicate_dir_free(struct replicate_dir *r);
 
+/* Whether image *i of a is image *j of b, bit by bit; of one size. */
+bool replicate_dir_share(const struct replicate_dir *a, const struct replicate_dir *b, int *i,
+                         int *j);
+
 /* Their moments, unit "replicate", spp 0 (not known). */
 NODISCARD bool replicate_dir_moments(const struct replicate_dir *r, struct moments *out,
                                      struct err *e);

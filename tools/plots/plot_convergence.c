@@ -3,7 +3,6 @@
 #include "plot.h"
 
 #include "tools/html/csv_link.h"
-#include "tools/html/html.h"
 #include "tools/results/results.h"
 
 #include <math.h>

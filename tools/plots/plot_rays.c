@@ -6,7 +6,6 @@
 #include "tools/html/html.h"
 #include "tools/results/results.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 

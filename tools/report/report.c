@@ -7,7 +7,6 @@
 #include "tools/plots/plot_rays.h"
 #include "tools/results/plain_words.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 

@@ -3,10 +3,8 @@
 #include "tools/compare/region.h"
 #include "tools/compare/verdict.h"
 #include "tools/html/html.h"
-#include "tools/results/results.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 static void fact_open(FILE *f, const char *label)

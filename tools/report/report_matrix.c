@@ -6,7 +6,6 @@
 #include "tools/html/html.h"
 #include "tools/html/plot_colour.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 

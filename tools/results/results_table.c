@@ -6,7 +6,6 @@
 #include "tools/compare/region.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 const struct column results_columns[] = {

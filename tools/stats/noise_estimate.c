@@ -51,11 +51,11 @@ struct block {
     double num, s2, s3, s4;
 };
 
-static struct block block_sums(const struct grid *d, int bx, int by)
+static struct block sums_in(const struct grid *d, int left, int top, int right, int bottom)
 {
     struct block s = {0};
-    for (int y = by * BLOCK; y < (by + 1) * BLOCK && y < d->height; y++)
-        for (int x = bx * BLOCK; x < (bx + 1) * BLOCK && x < d->width; x++) {
+    for (int y = top; y < bottom && y < d->height; y++)
+        for (int x = left; x < right && x < d->width; x++) {
             double r = second_difference(d, x, y);
             if (isnan(r))
                 continue;
@@ -65,6 +65,11 @@ static struct block block_sums(const struct grid *d, int bx, int by)
             s.s4 += r * r * r * r;
         }
     return s;
+}
+
+static struct block grid_sums(const struct grid *d)
+{
+    return sums_in(d, 0, 0, d->width, d->height);
 }
 
 struct blocks {
@@ -94,7 +99,7 @@ static bool blocks_make(const struct grid *d, struct blocks *g, struct err *e)
     for (int y = 0; y < g->ny; y++)
         for (int x = 0; x < g->nx; x++) {
             struct block *b = &g->b[(size_t)y * (size_t)g->nx + (size_t)x];
-            *b = block_sums(d, x, y);
+            *b = sums_in(d, x * BLOCK, y * BLOCK, (x + 1) * BLOCK, (y + 1) * BLOCK);
             total += b->num;
         }
     if (total < FEWEST)
@@ -167,22 +172,6 @@ static bool bin_means(const struct grid *d, int side, struct grid *bins, struct 
             bins->v[(size_t)y * (size_t)bins->width + (size_t)x] = sum / (side * side);
         }
     return true;
-}
-
-/* Sums of r^2 and r^4 over a grid. */
-static struct block grid_sums(const struct grid *d)
-{
-    struct block s = {0};
-    for (int y = 0; y < d->height; y++)
-        for (int x = 0; x < d->width; x++) {
-            double r = second_difference(d, x, y);
-            if (isnan(r))
-                continue;
-            s.num++;
-            s.s2 += r * r;
-            s.s4 += r * r * r * r;
-        }
-    return s;
 }
 
 /* Mean variance of the blocks in which one square of a side lies. */

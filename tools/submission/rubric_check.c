@@ -1,7 +1,6 @@
 #include "rubric_internal.h"
 #include "renderer/base/fs.h"
 
-#include "reference/truth/truth.h"
 #include "tools/base/text.h"
 #include "tools/images/tone_curve.h"
 

@@ -1,6 +1,5 @@
 #include "submission.h"
 
-#include "reference/base/process.h"
 #include "renderer/base/fs.h"
 #include "renderer/base/sha256.h"
 

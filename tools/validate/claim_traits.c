@@ -4,7 +4,6 @@
 #include "reference/suite/suite.h"
 #include "renderer/shading/light.h"
 #include "tools/results/noise_results.h"
-#include "tools/results/results.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -211,15 +211,10 @@ static bool same_image(const struct replicate_dir *r, const struct replicate_dir
     if (r->width != s->width || r->height != s->height)
         return err_set(e, "%s: is %d x %d pixels, the first render %d x %d", dir, s->width,
                        s->height, r->width, r->height);
-    size_t bytes = 3 * (size_t)r->width * (size_t)r->height * sizeof **r->rgb;
-    for (int i = 0; i < r->num; i++)
-        for (int j = 0; j < s->num; j++)
-            if (memcmp(r->rgb[i], s->rgb[j], bytes) == 0)
-                return err_set(e,
-                               "%s: %s is also in the first render: a second stage needs fresh "
-                               "seeds",
-                               dir, s->name != NULL ? s->name[j] : "one of it");
-    return true;
+    int i, j;
+    return !replicate_dir_share(r, s, &i, &j) ||
+           err_set(e, "%s: %s is also in the first render: a second stage needs fresh seeds", dir,
+                   s->name != NULL ? s->name[j] : "one of it");
 }
 
 /* Its replicates; those in memory stay whose they are. */

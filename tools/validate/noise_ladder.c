@@ -326,15 +326,7 @@ bool noise_ladder_is_kept(const char *golden_dir, const struct suite *suite)
 
 json_t *noise_ladder_load(const char *golden_dir, const char *scene, struct err *e)
 {
-    const struct path path = place(golden_dir, scene);
-    if (access(path.s, F_OK) != 0)
-        return json_object();
-    json_t *all = json_read_or_say(path.s, e);
-    if (all == NULL || json_is_object(all))
-        return all;
-    err_set(e, "%s: not a JSON object", path.s);
-    json_decref(all);
-    return NULL;
+    return json_read_object(place(golden_dir, scene).s, e);
 }
 
 bool noise_ladder_store(const char *golden_dir, const char *scene, const json_t *all, struct err *e)

@@ -6,7 +6,6 @@
 #include "tools/images/image_file.h"
 #include "tools/images/replicate_dir.h"
 
-#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
