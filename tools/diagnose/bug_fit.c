@@ -27,12 +27,24 @@ static const double much_light = 2;
 /* Of the difference between product and sum: how well is known what two bugs do together. */
 static const double unsure = 0.5;
 
+/* fmin() and fmax() of numbers; those are calls to a library. */
+static inline double at_most(double x, double most)
+{
+    return x < most ? x : most;
+}
+
+static inline double at_least(double x, double least)
+{
+    return x > least ? x : least;
+}
+
 /* The variance of the mean of value i, if the bug makes it `factor` times noisier than stated. A cell that by luck states less
  * than the correct renderer has at as many samples is not believed. */
-static double variance_of(const struct observation *clue, int i, double factor)
+static inline double variance_of(const struct signature *seen, const struct signature *correct,
+                                 int i, double factor)
 {
-    const struct signature *a = &clue->seen, *c = &clue->view->correct;
-    return fmax(factor * a->var[i], c->var[i] * c->n / a->n) + c->var[i];
+    return at_least(factor * seen->var[i], correct->var[i] * (correct->n / seen->n)) +
+           correct->var[i];
 }
 
 static double student(double z2, double var, double dof)
@@ -51,28 +63,39 @@ static double inflation(const struct effect *e, const struct signature *seen)
     return factor;
 }
 
-static void add_cell(const struct observation *clue, const struct effect *e, double amplitude,
-                     double factor, double scale, int cell, struct tally *t)
+/* A cell counts as the mean of its three values; one logarithm is taken for them, of the product. */
+static void add_cells(const struct observation *clue, const struct effect *e, double amplitude,
+                      double factor, struct tally *t)
 {
+    static const struct effect nothing;
     const struct signature *a = &clue->seen, *c = &clue->view->correct;
-    double log_likelihood = 0, chi2 = 0, chi2_mean = 0;
-    for (int i = 3 * cell; i < 3 * cell + 3; i++) {
-        double effect = e != NULL ? amplitude * (double)e->mean[i] : 0;
-        double noise = variance_of(clue, i, factor) +
-                       (e != NULL ? factor * amplitude * amplitude * (double)e->var[i] : 0);
-        double fuzz = pow(bug_fit_rounding * (a->mean[i] + c->mean[i] + scale), 2);
-        double var = noise + fuzz + pow(bug_fit_model_error * effect, 2);
-        double d = a->mean[i] - c->mean[i], z2 = pow(d - effect, 2) / var;
-        log_likelihood += student(z2, var, cell_dof) / 3;
-        chi2 += fmin(z2, 100) / 3;
-        chi2_mean += noise / var / 3;
-        t->left += (fmin(z2, 1e4) - noise / var) / 3;
-        t->all += (fmin(d * d / var, 1e4) - noise / var) / 3;
+    const double scale = signature_mean(c);
+    struct tally sum = {.cells = a->columns * a->rows};
+    e = e != NULL ? e : &nothing;
+    for (int i = 0; i < 3 * a->columns * a->rows;) {
+        double tails = 1, vars = 1;
+        for (int k = 0; k < 3; k++, i++) {
+            double effect = amplitude * (double)e->mean[i], d = a->mean[i] - c->mean[i];
+            double noise =
+                variance_of(a, c, i, factor) + factor * amplitude * amplitude * (double)e->var[i];
+            double fuzz = pow(bug_fit_rounding * (a->mean[i] + c->mean[i] + scale), 2);
+            double var = noise + fuzz + pow(bug_fit_model_error * effect, 2), weight = 1 / var;
+            double z2 = pow(d - effect, 2) * weight, expected = noise * weight;
+            tails *= 1 + z2 / cell_dof;
+            vars *= var;
+            sum.chi2 += at_most(z2, 100);
+            sum.chi2_mean += expected;
+            sum.left += at_most(z2, 1e4) - expected;
+            sum.all += at_most(d * d * weight, 1e4) - expected;
+        }
+        sum.log_likelihood -= 0.5 * ((cell_dof + 1) * log(tails) + log(vars));
     }
-    t->log_likelihood += log_likelihood;
-    t->chi2 += chi2;
-    t->chi2_mean += chi2_mean;
-    t->cells++;
+    t->log_likelihood += sum.log_likelihood / 3;
+    t->chi2 += sum.chi2 / 3;
+    t->chi2_mean += sum.chi2_mean / 3;
+    t->left += sum.left / 3;
+    t->all += sum.all / 3;
+    t->cells += sum.cells;
 }
 
 /* What a bug makes of S at the size of the image at hand: where all pixels depend on each other, S grows with their number. */
@@ -128,9 +151,7 @@ static void add_facts(const struct observation *clue, const struct effect *e, do
 static void add_view(const struct observation *clue, const struct effect *e, double amplitude,
                      double factor, struct tally *t)
 {
-    double scale = signature_mean(&clue->view->correct);
-    for (int i = 0; i < clue->seen.columns * clue->seen.rows; i++)
-        add_cell(clue, e, amplitude, factor, scale, i, t);
+    add_cells(clue, e, amplitude, factor, t);
     t->left = beyond_noise(t->left, t->cells);
     t->all = beyond_noise(t->all, t->cells);
     add_facts(clue, e, amplitude, t);
@@ -148,9 +169,9 @@ const struct effect *bug_fit_effect(const struct view *v, int bug, int second, b
 {
     const struct effect *a = v->effect[bug], *b = second >= 0 ? v->effect[second] : NULL;
     const struct signature *c = &v->correct;
-    double least = least_light * signature_mean(c);
     if (a == NULL || b == NULL)
         return a != NULL ? a : b;
+    double least = least_light * signature_mean(c);
     *room = (struct effect){.pixels = a->pixels || b->pixels};
     for (int i = 0; i < 3 * c->columns * c->rows; i++) {
         double light = c->mean[i], x = (double)a->mean[i], y = (double)b->mean[i];
@@ -279,12 +300,13 @@ struct projection {
     double along, norm, signal;
 };
 
-static void project_value(struct projection *p, double effect, double effect_var, double seen,
-                          double var)
+static inline void project_value(struct projection *p, double effect, double effect_var,
+                                 double seen, double var)
 {
-    p->along += effect * seen / var;
-    p->norm += effect * effect / var;
-    p->signal += (effect * effect - effect_var) / var;
+    const double weighed = effect / var;
+    p->along += weighed * seen;
+    p->norm += weighed * effect;
+    p->signal += weighed * effect - effect_var / var;
 }
 
 /* base: the effect that is there in any case; NULL: none. */
@@ -319,7 +341,7 @@ static struct projection project(const struct bug_fit *f, int bug, int second, i
         for (int i = 0; e != NULL && i < 3 * a->columns * a->rows; i++) {
             double there = base != NULL ? (double)base->mean[i] : 0;
             double effect = (double)e->mean[i] - there;
-            double var = variance_of(&f->clue[k], i, 1) + (double)e->var[i] + tiny * tiny +
+            double var = variance_of(a, c, i, 1) + (double)e->var[i] + tiny * tiny +
                          pow(bug_fit_model_error * (double)e->mean[i], 2);
             double noise = f->states_error && base == NULL ? (double)e->var[i] : 0;
             project_value(&p, effect, noise, a->mean[i] - c->mean[i] - there, var);
@@ -356,18 +378,29 @@ double bug_fit_amplitude(const struct bug_fit *f, int bug)
     return p.signal > 0 ? fmin(fmax(strength_of(&p), least_amplitude), largest_amplitude) : 1;
 }
 
-/* Golden section. */
+static double likelihood_at(const struct bug_fit *f, int bug, double amplitude)
+{
+    return total(f, &(struct candidate){.bug = bug, .second = -1, .amplitude = amplitude})
+        .log_likelihood;
+}
+
+/* Golden section: of the two points within, one is a point of the section before. */
 double bug_fit_refine(const struct bug_fit *f, int bug, double at)
 {
     const double golden = 0.6180339887498949, reach = 1.5;
     double lo = fmax(at / reach, least_amplitude), hi = fmin(at * reach, largest_amplitude);
+    double low = hi - golden * (hi - lo), high = lo + golden * (hi - lo);
+    double of_low = likelihood_at(f, bug, low), of_high = likelihood_at(f, bug, high);
     for (int i = 0; i < 12; i++) {
-        struct candidate low = {.bug = bug, .second = -1, .amplitude = hi - golden * (hi - lo)};
-        struct candidate high = {.bug = bug, .second = -1, .amplitude = lo + golden * (hi - lo)};
-        if (total(f, &low).log_likelihood > total(f, &high).log_likelihood)
-            hi = high.amplitude;
-        else
-            lo = low.amplitude;
+        if (of_low > of_high) {
+            hi = high, high = low, of_high = of_low;
+            low = hi - golden * (hi - lo);
+            of_low = likelihood_at(f, bug, low);
+        } else {
+            lo = low, low = high, of_low = of_high;
+            high = lo + golden * (hi - lo);
+            of_high = likelihood_at(f, bug, high);
+        }
     }
     return 0.5 * (lo + hi);
 }

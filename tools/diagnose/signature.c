@@ -79,10 +79,11 @@ bool signature_of(const struct moments *m, int columns, double asked, struct sig
 
 double signature_mean(const struct signature *s)
 {
-    double sum = 0;
-    for (int i = 0; i < 3 * s->columns * s->rows; i++)
-        sum += s->mean[i];
-    return sum / (3 * s->columns * s->rows);
+    double sum[3] = {0}; /* of each channel: additions that need not wait for each other */
+    for (int i = 0; i < 3 * s->columns * s->rows; i += 3)
+        for (int k = 0; k < 3; k++)
+            sum[k] += s->mean[i + k];
+    return (sum[0] + sum[1] + sum[2]) / (3 * s->columns * s->rows);
 }
 
 struct signature signature_average(const struct signature *s, int num)

@@ -29,10 +29,20 @@ struct pair {
     const unsigned char *use;
 };
 
-/* Sums for the slope of r^2 - c on m: kappa = xy/xx, and of squared residuals once kappa is known. */
+/* Sums for the slope of r^2 - c on m with weights w = 1/(m + c)^2: of v = w m^2 and u = w m (r^2 - c), so that kappa = u/v,
+ * and of their squares and products, so that what is left, of u - kappa v, has the sum of squares uu - 2 kappa uv + kappa^2 vv. */
 struct slope {
-    double num, xx, xy, residual;
+    double num, u, v, uu, uv, vv;
 };
+
+/* A square of the image, as far as it lies within. */
+static struct rect within(const struct submitted_image *s, int x, int y, int side)
+{
+    int x0 = x < 0 ? 0 : x, y0 = y < 0 ? 0 : y, x1 = x + side, y1 = y + side;
+    x1 = x1 > s->width ? s->width : x1;
+    y1 = y1 > s->height ? s->height : y1;
+    return (struct rect){x0, y0, x1 - x0, y1 - y0};
+}
 
 static bool all_used(const struct pair *p, int x, int y)
 {
@@ -45,18 +55,20 @@ static bool all_used(const struct pair *p, int x, int y)
     return true;
 }
 
-/* A difference r with E[r^2] = kappa m + known + rounding; weight 1/(m + known + rounding)^2. */
-static void add_square(double r, double m, double known, double rounding, double kappa,
-                       struct slope *s)
+/* A difference r with E[r^2] = kappa m + known + rounding. */
+static void add_square(double r, double m, double known, double rounding, struct slope *s)
 {
     /* Where rounding is the larger, r^2 says nothing of noise: a flat area is rounded alike everywhere. */
     if (m <= rounding)
         return;
-    double c = known + rounding, weight = 1 / ((m + c) * (m + c));
+    double c = known + rounding, weight = m / ((m + c) * (m + c));
+    double u = weight * (r * r - c), v = weight * m;
     s->num++;
-    s->xx += weight * m * m;
-    s->xy += weight * m * (r * r - c);
-    s->residual += pow(weight * m * (r * r - c - kappa * m), 2);
+    s->u += u;
+    s->v += v;
+    s->uu += u * u;
+    s->uv += u * v;
+    s->vv += v * v;
 }
 
 /* Second difference of a channel of `of` at a place, and the variance of it by its planes. */
@@ -81,24 +93,34 @@ static struct second second_difference(const struct submitted_image *of, int x, 
     return s;
 }
 
-static void add_place(const struct pair *p, int x, int y, size_t c, double kappa, struct slope *s)
+static void add_place(const struct pair *p, int x, int y, size_t c, struct slope *s)
 {
     struct second a = second_difference(p->a, x, y, c), b = second_difference(p->b, x, y, c);
     double known = p->b->known ? b.variance : 0;
     add_square(a.value - b.value, a.variance + b.variance - known, known, a.rounding + b.rounding,
-               kappa, s);
+               s);
 }
 
 /* Each run of A less the next, at one pixel, whatever is wrong with both. */
-static void add_runs(const struct pair *p, int x, int y, size_t c, double kappa, struct slope *s)
+static void add_runs(const struct pair *p, int x, int y, size_t c, struct slope *s)
 {
     size_t i = 3 * ((size_t)y * (size_t)p->a->width + (size_t)x) + c;
     for (int k = 0; k + 1 < p->a->num_runs; k++) {
         const struct submitted_image *one = &p->a->run[k], *next = one + 1;
         if (!one->clipped[i] && !next->clipped[i])
             add_square(one->mean[i] - next->mean[i], one->variance[i] + next->variance[i], 0,
-                       one->rounding[i] + next->rounding[i], kappa, s);
+                       one->rounding[i] + next->rounding[i], s);
     }
+}
+
+static void add_slope(struct slope *to, const struct slope *s)
+{
+    to->num += s->num;
+    to->u += s->u;
+    to->v += s->v;
+    to->uu += s->uu;
+    to->uv += s->uv;
+    to->vv += s->vv;
 }
 
 static bool has_runs(const struct pair *p)
@@ -106,17 +128,14 @@ static bool has_runs(const struct pair *p)
     return p->a->num_runs > 1 && p->b->known;
 }
 
-static struct slope sum_places(const struct pair *p, struct rect r, double kappa)
+static void add_places(const struct pair *p, struct rect r, struct slope *s)
 {
-    struct slope s = {0};
+    const bool runs = has_runs(p);
     for (int y = r.y; y < r.y + r.height; y++)
         for (int x = r.x; x < r.x + r.width; x++)
-            for (size_t c = 0; c < 3; c++)
-                if (has_runs(p) && p->use[(size_t)y * (size_t)p->a->width + (size_t)x])
-                    add_runs(p, x, y, c, kappa, &s);
-                else if (!has_runs(p) && all_used(p, x, y))
-                    add_place(p, x, y, c, kappa, &s);
-    return s;
+            if (runs ? p->use[(size_t)y * (size_t)p->a->width + (size_t)x] : all_used(p, x, y))
+                for (size_t c = 0; c < 3; c++)
+                    runs ? add_runs(p, x, y, c, s) : add_place(p, x, y, c, s);
 }
 
 struct noise {
@@ -125,18 +144,57 @@ struct noise {
     bool known;
 };
 
-static struct noise noise_in(const struct pair *p, struct rect r)
+static struct noise noise_by(const struct pair *p, const struct slope *s)
 {
-    struct slope s = sum_places(p, r, 0);
-    if (s.num < FEWEST)
+    if (s->num < FEWEST)
         return (struct noise){.kappa = 1, .dof = unknown_dof};
-    struct noise n = {.kappa = s.xy / s.xx, .known = s.xy > 0};
-    n.kappa = fmax(least_kappa, n.kappa);
-    s = sum_places(p, r, n.kappa);
+    struct noise n = {.kappa = fmax(least_kappa, s->u / s->v), .known = s->u > 0};
+    double residual = fmax(0, s->uu - 2 * n.kappa * s->uv + n.kappa * n.kappa * s->vv);
     double variance =
-        (has_runs(p) ? runs_shared : overlap) * channels_alike * s.residual / (s.xx * s.xx);
+        (has_runs(p) ? runs_shared : overlap) * channels_alike * residual / (s->v * s->v);
     n.dof = fmax(3, stats_dof(n.kappa, variance));
     return n;
+}
+
+static struct noise noise_in_image(const struct pair *p)
+{
+    struct slope s = {0};
+    add_places(p, (struct rect){0, 0, p->a->width, p->a->height}, &s);
+    return noise_by(p, &s);
+}
+
+/* Of the image, and of each whole tile with the eight around it, by rows, which the caller frees. */
+static bool noises_of(const struct pair *p, struct noise *image, struct noise **of_tile,
+                      struct err *e)
+{
+    const int columns = p->a->width / RUBRIC_TILE, rows = p->a->height / RUBRIC_TILE;
+    /* Of all tiles, the last may be cut off. */
+    const int across = (p->a->width + RUBRIC_TILE - 1) / RUBRIC_TILE,
+              down = (p->a->height + RUBRIC_TILE - 1) / RUBRIC_TILE;
+    struct slope *slope = calloc((size_t)across * (size_t)down, sizeof *slope);
+    *of_tile = calloc((size_t)columns * (size_t)rows, sizeof **of_tile);
+    if (slope == NULL || *of_tile == NULL) {
+        free(slope);
+        free(*of_tile);
+        return err_set(e, "out of memory");
+    }
+    for (int t = 0; t < across * down; t++)
+        add_places(p, within(p->a, t % across * RUBRIC_TILE, t / across * RUBRIC_TILE, RUBRIC_TILE),
+                   &slope[t]);
+    struct slope all = {0};
+    for (int t = 0; t < across * down; t++)
+        add_slope(&all, &slope[t]);
+    *image = noise_by(p, &all);
+    for (int t = 0; t < columns * rows; t++) {
+        struct slope s = {0};
+        for (int y = t / columns - 1; y <= t / columns + 1; y++)
+            for (int x = t % columns - 1; x <= t % columns + 1; x++)
+                if (x >= 0 && y >= 0 && x < across && y < down)
+                    add_slope(&s, &slope[y * across + x]);
+        (*of_tile)[t] = noise_by(p, &s);
+    }
+    free(slope);
+    return true;
 }
 
 /* Sums over a region, one channel. */
@@ -235,27 +293,18 @@ static double measured_dof(const struct pair *p, const struct sums *s)
     return s->v2 > 0 ? fmax(3, (d + 2) * s->v * s->v / s->v2) : 1e6;
 }
 
-static struct rect around(const struct submitted_image *s, struct rect r)
+/* noise: of the tile and what is around it. */
+static void measure_tile(const struct pair *p, struct rect r, struct noise noise,
+                         const struct noise *whole, double floor, double alpha, double *furthest,
+                         double *relative, struct difference *out)
 {
-    int x0 = r.x - RUBRIC_TILE, y0 = r.y - RUBRIC_TILE, x1 = r.x + 2 * RUBRIC_TILE,
-        y1 = r.y + 2 * RUBRIC_TILE;
-    x0 = x0 < 0 ? 0 : x0;
-    y0 = y0 < 0 ? 0 : y0;
-    x1 = x1 > s->width ? s->width : x1;
-    y1 = y1 > s->height ? s->height : y1;
-    return (struct rect){x0, y0, x1 - x0, y1 - y0};
-}
-
-static void measure_tile(const struct pair *p, struct rect r, const struct noise *whole,
-                         double floor, double alpha, double *furthest, double *relative,
-                         struct difference *out)
-{
-    struct noise noise = noise_in(p, around(p->a, r));
     if (!noise.known || noise.dof < unknown_dof || noise.kappa <= whole->kappa)
         noise = *whole;
     struct sums s = sum_pixels(p, r, CHANNEL_LUMINANCE, noise.kappa);
     if (is_measured(p)) { /* what is rare may have been missed in one tile */
-        struct sums wide = sum_pixels(p, around(p->a, r), CHANNEL_LUMINANCE, noise.kappa);
+        struct sums wide =
+            sum_pixels(p, within(p->a, r.x - RUBRIC_TILE, r.y - RUBRIC_TILE, 3 * RUBRIC_TILE),
+                       CHANNEL_LUMINANCE, noise.kappa);
         noise.dof = measured_dof(p, &s);
         s.v = fmax(s.v, missed * wide.v * s.b / fmax(wide.b, 1e-30));
     }
@@ -289,15 +338,17 @@ bool difference_measure(const struct submitted_image *a, const struct submitted_
     int columns = a->width / RUBRIC_TILE, rows = a->height / RUBRIC_TILE;
     double pixels = (double)a->width * a->height, furthest = -1;
     *out = (struct difference){0};
-    struct noise noise = noise_in(&p, whole);
-    struct sums luminance = sum_pixels(&p, whole, CHANNEL_LUMINANCE, noise.kappa);
+    struct noise noise, *local;
+    struct sums luminance = sum_pixels(&p, whole, CHANNEL_LUMINANCE, 1);
     out->compared = luminance.used / pixels;
-    out->kappa = noise.kappa;
     if (out->compared < least_used)
         return err_set(e, "only %.0f %% of the pixels can be compared, the others are saturated",
                        100 * out->compared);
     if (!(luminance.b > 0))
         return err_set(e, "there is no light to compare with");
+    if (!noises_of(&p, &noise, &local, e))
+        return false;
+    out->kappa = noise.kappa;
     double floor = floor_fraction * luminance.b / luminance.used;
     alpha /= NUM_CHANNELS + columns * rows;
     for (int c = 0; c < NUM_CHANNELS; c++) {
@@ -309,13 +360,16 @@ bool difference_measure(const struct submitted_image *a, const struct submitted_
         out->blur[c] = s.tolerance / fmax(s.b, floor * s.used);
     }
     out->relative = calloc((size_t)columns * (size_t)rows, sizeof *out->relative);
-    if (out->relative == NULL)
+    if (out->relative == NULL) {
+        free(local);
         return err_set(e, "out of memory");
+    }
     for (int i = 0; i < columns * rows; i++) {
         struct rect r = {i % columns * RUBRIC_TILE, i / columns * RUBRIC_TILE, RUBRIC_TILE,
                          RUBRIC_TILE};
-        measure_tile(&p, r, &noise, floor, alpha, &furthest, &out->relative[i], out);
+        measure_tile(&p, r, local[i], &noise, floor, alpha, &furthest, &out->relative[i], out);
     }
+    free(local);
     return true;
 }
 
@@ -329,22 +383,22 @@ double difference_kappa(const struct submitted_image *a, const struct submitted_
                         const unsigned char *use)
 {
     const struct pair p = {a, reference, use};
-    return noise_in(&p, (struct rect){0, 0, a->width, a->height}).kappa;
+    return noise_in_image(&p).kappa;
 }
 
-void difference_kappas(const struct submitted_image *a, const struct submitted_image *reference,
-                       const unsigned char *use, double *kappa, double *sd)
+bool difference_kappas(const struct submitted_image *a, const struct submitted_image *reference,
+                       const unsigned char *use, double *kappa, double *sd, struct err *e)
 {
     const struct pair p = {a, reference, use};
-    int columns = a->width / RUBRIC_TILE, rows = a->height / RUBRIC_TILE;
-    struct noise whole = noise_in(&p, (struct rect){0, 0, a->width, a->height});
+    int tiles = a->width / RUBRIC_TILE * (a->height / RUBRIC_TILE);
+    struct noise whole, *local;
+    if (!noises_of(&p, &whole, &local, e))
+        return false;
     *sd = sqrt(2 / whole.dof);
-    for (int t = 0; t < columns * rows; t++) {
-        const struct rect r = {t % columns * RUBRIC_TILE, t / columns * RUBRIC_TILE, RUBRIC_TILE,
-                               RUBRIC_TILE};
-        struct noise local = noise_in(&p, around(a, r));
-        kappa[t] = local.known && local.dof >= unknown_dof ? local.kappa : whole.kappa;
-    }
+    for (int t = 0; t < tiles; t++)
+        kappa[t] = local[t].known && local[t].dof >= unknown_dof ? local[t].kappa : whole.kappa;
+    free(local);
+    return true;
 }
 
 bool difference_correlated(const struct submitted_image *a, const struct submitted_image *b,
@@ -390,9 +444,8 @@ bool difference_noise(const struct submitted_image *p, const struct submitted_im
                       const struct submitted_image *q, const struct submitted_image *reference_q,
                       const unsigned char *use, double alpha, struct interval *out, struct err *e)
 {
-    const struct rect whole = {0, 0, p->width, p->height};
     const struct pair a = {p, reference_p, use}, b = {q, reference_q, use};
-    struct noise na = noise_in(&a, whole), nb = noise_in(&b, whole);
+    struct noise na = noise_in_image(&a), nb = noise_in_image(&b);
     if (!na.known || !nb.known)
         return err_set(e, "there is no noise in one of the images");
     /* Var ln v = 2/dof. */

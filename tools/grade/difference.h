@@ -58,8 +58,9 @@ double difference_kappa(const struct submitted_image *a, const struct submitted_
 
 /* The same of each tile and what is around it, or of the image where that says too little; *sd: of the logarithm of that
  * of the image. kappa: by rows. */
-void difference_kappas(const struct submitted_image *a, const struct submitted_image *reference,
-                       const unsigned char *use, double *kappa, double *sd);
+NODISCARD bool difference_kappas(const struct submitted_image *a,
+                                 const struct submitted_image *reference, const unsigned char *use,
+                                 double *kappa, double *sd, struct err *e);
 
 /* Do the errors of two runs, in second differences, go together more than those of independent runs, by 6 standard
  * deviations? (Products of independent errors: variance 1/n, times 4 for overlap and 3 for channels alike; what the noise of

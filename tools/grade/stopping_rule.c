@@ -158,15 +158,15 @@ bool stopping_rule_range(const struct rubric_image *p, const struct submitted_im
     gsl_rng *rng = gsl_rng_alloc(gsl_rng_taus2);
     *out = (struct stopping){.low = calloc(tiles, sizeof *out->low),
                              .high = calloc(tiles, sizeof *out->high)};
-    bool ok = (kappa != NULL && rng != NULL && out->low != NULL && out->high != NULL) ||
-              err_set(e, "out of memory");
+    bool ok = ((kappa != NULL && rng != NULL && out->low != NULL && out->high != NULL) ||
+               err_set(e, "out of memory")) &&
+              difference_kappas(s, right, use, kappa, &sd, e);
     if (ok) {
         const struct simulation sim = {.rng = rng,
                                        .image = p,
                                        .m = m,
                                        .batch = rubric_option(p, "-a", 0),
                                        .tolerance = rubric_option(p, "-a", 1)};
-        difference_kappas(s, right, use, kappa, &sd);
         simulate(&sim, kappa, sd, out);
     } else {
         stopping_rule_free(out);
@@ -215,7 +215,7 @@ bool stopping_rule_samples(const struct rubric_image *p, const struct submitted_
     if (ok)
         memset(use, 1, pixels);
     ok = ok && submitted_image_comparable(s, m, p->spp, false, use, e) &&
-         submitted_image_from(m, s, &right, e);
+         submitted_image_from(m, s, &right, e) && difference_kappas(s, &right, use, kappa, &sd, e);
     if (ok) {
         struct simulation sim = {.rng = rng,
                                  .image = p,
@@ -223,7 +223,6 @@ bool stopping_rule_samples(const struct rubric_image *p, const struct submitted_
                                  .light = light,
                                  .batch = rubric_option(p, "-a", 0),
                                  .tolerance = rubric_option(p, "-a", 1)};
-        difference_kappas(s, &right, use, kappa, &sd);
         light_of(s, m, light);
         for (int by = 0; by < NUM_STOPPING_KINDS; by++) {
             sim.by = (enum stopping_kind)by;
