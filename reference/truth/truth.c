@@ -6,7 +6,6 @@
 #include "truth_mirrors_and_glass.h"
 #include "truth_sky.h"
 #include "truth_sun.h"
-#include "truth_snell_window.h"
 #include "truth_values.h"
 
 #include <stdio.h>
@@ -35,8 +34,8 @@ static bool fill_furnace(const struct suite_scene *scene, const struct suite_ref
 static const struct truth_kind furnaces[] = {{"furnace", fill_furnace, true}, {0}};
 
 static const struct truth_kind *const families[] = {
-    furnaces,  truth_lamps, truth_lens,   truth_mirrors_and_glass, truth_snell_window, truth_ggx,
-    truth_sky, truth_sun,   truth_texture};
+    furnaces,  truth_lamps, truth_lens, truth_mirrors_and_glass,
+    truth_ggx, truth_sky,   truth_sun,  truth_texture};
 
 static const struct truth_kind *find_kind(const char *name)
 {

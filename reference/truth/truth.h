@@ -6,7 +6,7 @@
  * furnace   emission [W sr^-1 m^-2], albedo
  *
  * The other kinds are listed in truth_lamps.h, truth_sun.h, truth_lens.h,
- * truth_mirrors_and_glass.h, truth_snell_window.h, truth_ggx.h and truth_sky.h, those of truth_texture.c below. */
+ * truth_mirrors_and_glass.h, truth_ggx.h and truth_sky.h, those of truth_texture.c below. */
 #ifndef ASSAY_TRUTH_H
 #define ASSAY_TRUTH_H
 

@@ -5,6 +5,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include <gsl/gsl_sort.h>
 
@@ -160,11 +161,12 @@ static bool fill_mirror_box(const struct suite_scene *scene, const struct suite_
     return ok;
 }
 
-/* The slab. */
+/* The slab, and the window, which is its surface seen from inside. */
 
-struct slab {
-    double n, front[3], behind[3];
+struct pane {
+    double n, front[3], behind[3]; /* of a window what is below and above it */
     int depth;
+    bool is_window;
 };
 
 void truth_slab_shares(double cos_i, double n, int depth, double *front, double *behind)
@@ -176,33 +178,48 @@ void truth_slab_shares(double cos_i, double n, int depth, double *front, double 
     *front = share[1] + (depth >= 1 ? f : 0);
 }
 
-static int slab_radiance(const void *form, const double eye[3], const double d[3], double light[3])
+void truth_window_shares(double cosine, double n, double *floor, double *sky)
 {
-    const struct slab *s = form;
-    double front, behind;
-    (void)eye;
-    truth_slab_shares(fabs(d[2]), s->n, s->depth, &front, &behind);
-    for (int c = 0; c < 3; c++)
-        light[c] = front * s->front[c] + behind * s->behind[c];
-    return d[2] < 0;
+    *floor = truth_fresnel(cosine, 1 / n, NULL);
+    *sky = n * n * (1 - *floor);
 }
 
-static bool fill_slab(const struct suite_scene *scene, const struct suite_reference *ref,
+static int pane_radiance(const void *form, const double eye[3], const double d[3], double light[3])
+{
+    const struct pane *s = form;
+    double front, behind;
+    (void)eye;
+    if (s->is_window)
+        truth_window_shares(d[1], s->n, &front, &behind);
+    else
+        truth_slab_shares(fabs(d[2]), s->n, s->depth, &front, &behind);
+    for (int c = 0; c < 3; c++)
+        light[c] = front * s->front[c] + behind * s->behind[c];
+    return s->is_window ? behind > 0 : d[2] < 0;
+}
+
+static bool fill_pane(const struct suite_scene *scene, const struct suite_reference *ref,
                       struct moments *out, struct err *e)
 {
-    struct slab s = {.depth = scene->depth};
+    struct pane s = {.depth = scene->depth, .is_window = strcmp(ref->kind, "snell_window") == 0};
     struct truth_view view;
-    if (!truth_values_read(ref->values, e, "(view) ior>1 front[3]>=0 behind[3]>=0", &s.n, s.front,
-                           s.behind) ||
-        !truth_view_read(ref->values, scene, &view, e))
+    if (!truth_values_read(ref->values, e,
+                           s.is_window ? "(view) ior>1 floor[3]>=0 sky[3]>=0"
+                                       : "(view) ior>1 front[3]>=0 behind[3]>=0",
+                           &s.n, s.front, s.behind) ||
+        !truth_view_read(ref->values, scene, &view, e) ||
+        (s.is_window && !truth_check_depth(scene, e)))
         return false;
+    if (s.is_window && !(view.eye[1] < 0))
+        return err_set(e, "the eye is at height %g, not below the surface", view.eye[1]);
     for (int k = 0; k < 4; k++) {
         double d[3];
         truth_view_direction(&view, k % 2 ? 1 : -1, k / 2 ? 1 : -1, d);
-        if (!(d[2] < 0))
-            return err_set(e, "a corner of the image does not look at the slab");
+        if (!(s.is_window ? d[1] > 0 : d[2] < 0))
+            return err_set(e, "a corner of the image does not look %s",
+                           s.is_window ? "up" : "at the slab");
     }
-    return truth_view_render(&view, slab_radiance, &s, out, e);
+    return truth_view_render(&view, pane_radiance, &s, out, e);
 }
 
 /* The sphere. */
@@ -300,6 +317,7 @@ static bool fill_sphere(const struct suite_scene *scene, const struct suite_refe
 }
 
 const struct truth_kind truth_mirrors_and_glass[] = {{"mirror_box", fill_mirror_box, false},
-                                                     {"glass_slab", fill_slab, true},
+                                                     {"glass_slab", fill_pane, true},
                                                      {"glass_sphere", fill_sphere, true},
+                                                     {"snell_window", fill_pane, true},
                                                      {0}};

@@ -8,6 +8,7 @@
  * glass_slab    view (truth_pixel_mean.h), ior, front, behind [radiance on either side]
  * glass_sphere  view, ior, centre, radius, room {x, y, z: [lo, hi]}, walls {left, right, bottom, top,
  *               far, near: radiance of the walls at x lo, x hi, y lo, y hi, z lo, z hi}
+ * snell_window  view, ior, sky, floor [radiance]
  *
  * mirror_box: the camera at `eye` looks along -Z, image up being +Y; tan_half is the tangent of half
  * its angle. All walls are mirrors but three of the four panels into which `split` divides the end:
@@ -16,6 +17,8 @@
  * glass_slab: a slab parallel to the plane z = 0 with clear sides far away; what is on the side of +Z,
  * where the eye is, has the radiance `front`, what is on the other side `behind`.
  * glass_sphere: in a closed room of black glowing walls; the eye in the room, outside the sphere.
+ * snell_window: the plane y = 0 bounds glass below it. The eye is in the glass and looks up. Above, the radiance
+ * `sky` comes from everywhere; what the surface reflects comes from a floor of radiance `floor`.
  * Glass absorbs nothing. Every reflection and every refraction counts as one bounce. */
 #ifndef ASSAY_TRUTH_MIRRORS_AND_GLASS_H
 #define ASSAY_TRUTH_MIRRORS_AND_GLASS_H
@@ -40,6 +43,10 @@ void truth_mirror_box_radiance(const struct truth_mirror_box *b, int depth, doub
 
 /* Light from in front of the slab and from behind it, as shares of the radiance seen under cos_i. */
 void truth_slab_shares(double cos_i, double n, int depth, double *front, double *behind);
+
+/* Shares of floor and sky in the radiance inside that is seen under the angle with that cosine from the
+ * normal: F and n^2 (1 - F), F by Fresnel's equations from inside [Veach97 5.2]. */
+void truth_window_shares(double cosine, double n, double *floor, double *sky);
 
 struct truth_glass_sphere {
     double n, centre[3], radius;

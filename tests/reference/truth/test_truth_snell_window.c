@@ -1,7 +1,7 @@
 /* The closed forms of 16_snell_window, 28_beckmann_furnace and 39_three_lamps against other routes to the
  * same numbers, which must reject forms with a known mistake. */
 #include "reference/truth/truth_ggx.h"
-#include "reference/truth/truth_snell_window.h"
+#include "reference/truth/truth_mirrors_and_glass.h"
 #include "tests/support/optics.h"
 #include "tests/support/quadrature.h"
 #include "tests/support/own.h"
