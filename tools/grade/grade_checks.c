@@ -44,6 +44,8 @@ struct work {
     const struct grading *g;
     const struct rubric_check *check;
     int set;
+    unsigned char *use;                /* pixels that can be compared; NULL: nobody has asked */
+    struct submitted_image compare[2]; /* what images are held against */
 };
 
 static const struct rubric_image *image_of(const struct work *w, int k)
@@ -125,40 +127,39 @@ static void model_noise(const struct work *w, const unsigned char *use, const do
         submitted_image_scale_skewness(&w->g->h->image[w->check->images[k]], use);
 }
 
-/* Pixels that can be compared. What is noisier than our renders reaches the clipping point from further away; where
- * that leaves too little, and more samples can be had, they are needed first. NULL: our trouble. */
-static unsigned char *usable(const struct work *w, struct result *out, struct err *e)
+/* Fills w->use. What is noisier than our renders reaches the clipping point from further away; where that leaves too little, and
+ * more samples can be had, they are needed first. False: our trouble. */
+static bool find_usable(struct work *w, struct result *out, struct err *e)
 {
     static const double louder = 1.3, fewest = 0.3;
     size_t pixels = (size_t)student(w, 0)->width * (size_t)student(w, 0)->height, left = 0;
-    unsigned char *use = malloc(2 * pixels), *quiet = use + pixels;
+    unsigned char *use = w->use = malloc(2 * pixels), *quiet = use + pixels;
     double kappa[CHECK_IMAGES];
-    bool ok = use != NULL || err_set(e, "out of memory for %zu pixels", pixels);
-    for (size_t p = 0; ok && p < pixels; p++)
+    if (use == NULL)
+        return err_set(e, "out of memory for %zu pixels", pixels);
+    for (size_t p = 0; p < pixels; p++)
         use[p] = !is_masked(w, student(w, 0), p);
-    for (int k = 0; ok && k < w->check->num_images; k++)
-        ok = submitted_image_comparable(student(w, k), expected_noise(w, k), least_samples(w, k),
-                                        false, use, e);
-    for (int k = 0; ok && k < w->check->num_images; k++)
-        ok = measure_noise(w, k, use, &kappa[k], &out->noise[k], e);
-    if (ok)
-        model_noise(w, use, kappa);
-    if (ok)
-        memcpy(quiet, use, pixels);
-    for (int k = 0; ok && k < w->check->num_images; k++)
-        if (kappa[k] > louder || student(w, k)->num_runs > 1)
-            ok = submitted_image_comparable(student(w, k), expected_noise(w, k),
-                                            least_samples(w, k) / kappa[k], true, quiet, e);
-    for (size_t p = 0; ok && p < pixels; p++)
+    for (int k = 0; k < w->check->num_images; k++)
+        if (!submitted_image_comparable(student(w, k), expected_noise(w, k), least_samples(w, k),
+                                        false, use, e))
+            return false;
+    for (int k = 0; k < w->check->num_images; k++)
+        if (!measure_noise(w, k, use, &kappa[k], &out->noise[k], e))
+            return false;
+    model_noise(w, use, kappa);
+    memcpy(quiet, use, pixels);
+    for (int k = 0; k < w->check->num_images; k++)
+        if ((kappa[k] > louder || student(w, k)->num_runs > 1) &&
+            !submitted_image_comparable(student(w, k), expected_noise(w, k),
+                                        least_samples(w, k) / kappa[k], true, quiet, e))
+            return false;
+    for (size_t p = 0; p < pixels; p++)
         left += quiet[p];
-    if (ok && (double)left >= fewest * (double)pixels)
+    if ((double)left >= fewest * (double)pixels)
         memcpy(use, quiet, pixels);
-    else if (ok && memcmp(use, quiet, pixels) != 0)
+    else if (memcmp(use, quiet, pixels) != 0)
         out->more = few;
-    if (ok)
-        return use;
-    free(use);
-    return NULL;
+    return true;
 }
 
 /* The noise of the reference itself, in an image that should have noise of its own: a copy. A share of values
@@ -257,12 +258,11 @@ static double skewness_of(const struct submitted_image *s, const unsigned char *
 
 /* A against B; what keeps them from being compared, but for memory, is the student's to mend. */
 static bool compare(const struct work *w, const struct submitted_image *a,
-                    const struct submitted_image *b, const unsigned char *use, struct result *out,
-                    struct err *e)
+                    const struct submitted_image *b, struct result *out, struct err *e)
 {
     struct err why;
     bool blind = out->more > 0;
-    const bool measured = difference_measure(a, b, use, w->g->alpha, &out->agreement, &why);
+    const bool measured = difference_measure(a, b, w->use, w->g->alpha, &out->agreement, &why);
     if (measured) {
         score_agreement(w, out);
         blind =
@@ -272,32 +272,30 @@ static bool compare(const struct work *w, const struct submitted_image *a,
     else
         snprintf(out->seen, sizeof out->seen, "cannot be compared: %.370s", why.msg);
     for (int k = 0; measured && out->agreement.skewed && k < w->check->num_images; k++)
-        out->noise[k] = skewness_of(student(w, k), use);
+        out->noise[k] = skewness_of(student(w, k), w->use);
     settle(w, blind, out);
     return true;
 }
 
 /* What the rule of stopping may do to this program: the range for an adaptive image with as much noise as the student's. */
-static bool stopping_of(const struct work *w, const unsigned char *use, struct stopping *out,
-                        struct err *e)
+static bool stopping_of(const struct work *w, struct stopping *out, struct err *e)
 {
     struct submitted_image right;
     if (!submitted_image_from(expected_noise(w, 0), student(w, 0), &right, e))
         return false;
-    bool ok = stopping_rule_range(image_of(w, 0), student(w, 0), &right, expected_noise(w, 0), use,
-                                  out, e);
+    bool ok = stopping_rule_range(image_of(w, 0), student(w, 0), &right, expected_noise(w, 0),
+                                  w->use, out, e);
     submitted_image_free(&right);
     return ok;
 }
 
 /* The rule of stopping is biased, which is not the student's fault: against what it does to noise like his. */
-static bool compare_stopped(const struct work *w, struct submitted_image *right,
-                            const unsigned char *use, double blind, struct result *out,
-                            struct err *e)
+static bool compare_stopped(struct work *w, double blind, struct result *out, struct err *e)
 {
+    struct submitted_image *right = &w->compare[0];
     struct stopping rule;
     int columns = right->width / RUBRIC_TILE;
-    if (!stopping_of(w, use, &rule, e))
+    if (!stopping_of(w, &rule, e))
         return false;
     for (size_t i = 0; i < 3 * (size_t)right->width * (size_t)right->height; i++) {
         int x = (int)(i / 3) % right->width, y = (int)(i / 3) / right->width;
@@ -309,27 +307,26 @@ static bool compare_stopped(const struct work *w, struct submitted_image *right,
     difference_free(&out->agreement);
     out->share = out->chance = 0;
     out->more = blind;
-    return compare(w, student(w, 0), right, use, out, e);
+    return compare(w, student(w, 0), right, out, e);
 }
 
-static bool check_equal(const struct work *w, struct result *out, struct err *e)
+static bool check_equal(struct work *w, struct result *out, struct err *e)
 {
     const struct rubric_image *p = image_of(w, 0);
     const struct moments *plain = &w->g->a->of[0][w->check->images[0]].m;
     const struct submitted_image *s = student(w, 0), *first = s->num_runs > 0 ? s->run : s;
-    unsigned char *use = usable(w, out, e);
-    struct submitted_image b = {0};
-    double blind = out->more;
     snprintf(
         out->expected, sizeof out->expected,
         "the mean of the image within %.3g %%, of any 8 x 8 pixels within %.3g %% of the reference",
         100 * w->check->image.full, 100 * w->check->tile.full);
-    bool ok = use != NULL && submitted_image_from(reference(w, 0), student(w, 0), &b, e) &&
-              compare(w, student(w, 0), &b, use, out, e);
-    if (ok && out->share < 1 && rubric_is_adaptive(p))
-        ok = compare_stopped(w, &b, use, blind, out, e);
-    if (ok &&
-        (is_copy(first, reference(w, 0), p->spp, use) || is_copy(first, plain, p->spp, use))) {
+    if (!find_usable(w, out, e))
+        return false;
+    double blind = out->more;
+    if (!submitted_image_from(reference(w, 0), s, &w->compare[0], e) ||
+        !compare(w, s, &w->compare[0], out, e) ||
+        (out->share < 1 && rubric_is_adaptive(p) && !compare_stopped(w, blind, out, e)))
+        return false;
+    if (is_copy(first, reference(w, 0), p->spp, w->use) || is_copy(first, plain, p->spp, w->use)) {
         out->share = out->chance = 0;
         snprintf(
             out->seen, sizeof out->seen,
@@ -337,9 +334,7 @@ static bool check_equal(const struct work *w, struct result *out, struct err *e)
             p->spp);
         snprintf(out->flag, sizeof out->flag, "%s is a copy of the reference", p->name);
     }
-    submitted_image_free(&b);
-    free(use);
-    return ok;
+    return true;
 }
 
 /* A copy of q, moved by the difference of two references, with their noise. */
@@ -361,7 +356,7 @@ static bool moved(const struct submitted_image *q, const struct moments *to,
     return ok;
 }
 
-static bool check_agree(const struct work *w, struct result *out, struct err *e)
+static bool check_agree(struct work *w, struct result *out, struct err *e)
 {
     const struct moments *m = reference(w, 0), *n = reference(w, 1);
     bool deviates = w->set > 0 && m != NULL && n != NULL;
@@ -375,33 +370,23 @@ static bool check_agree(const struct work *w, struct result *out, struct err *e)
                  "the two files are the same: the option that tells them apart has no effect");
         return true;
     }
-    unsigned char *use = usable(w, out, e);
-    struct submitted_image b = {0};
-    bool ok = use != NULL && (!deviates || moved(student(w, 1), m, n, &b, e));
-    ok = ok && compare(w, student(w, 0), deviates ? &b : student(w, 1), use, out, e);
-    submitted_image_free(&b);
-    free(use);
-    return ok;
+    return find_usable(w, out, e) && (!deviates || moved(student(w, 1), m, n, &w->compare[0], e)) &&
+           compare(w, student(w, 0), deviates ? &w->compare[0] : student(w, 1), out, e);
 }
 
-static bool check_sum(const struct work *w, struct result *out, struct err *e)
+static bool check_sum(struct work *w, struct result *out, struct err *e)
 {
-    struct submitted_image sum = {0};
-    unsigned char *use = usable(w, out, e);
-    bool ok = use != NULL && submitted_image_from(NULL, student(w, 0), &sum, e);
+    struct submitted_image *sum = &w->compare[0];
     snprintf(out->expected, sizeof out->expected,
              "%s is the sum of the other %d images, within %.3g %% (any 8 x 8 pixels: %.3g %%)",
              image_of(w, 0)->name, w->check->num_images - 1, 100 * w->check->image.full,
              100 * w->check->tile.full);
-    for (int k = 1; ok && k < w->check->num_images; k++)
-        submitted_image_add(&sum, student(w, k));
-    if (ok) {
-        submitted_image_unclipped(&sum, use);
-        ok = compare(w, student(w, 0), &sum, use, out, e);
-    }
-    submitted_image_free(&sum);
-    free(use);
-    return ok;
+    if (!find_usable(w, out, e) || !submitted_image_from(NULL, student(w, 0), sum, e))
+        return false;
+    for (int k = 1; k < w->check->num_images; k++)
+        submitted_image_add(sum, student(w, k));
+    submitted_image_unclipped(sum, w->use);
+    return compare(w, student(w, 0), sum, out, e);
 }
 
 /* Deterministic shares of pixels. */
@@ -428,7 +413,7 @@ static void map_wrong(struct difference *map, int columns, int x, int y)
 
 /* An image without noise but for where in the pixel its rays fell: 6 standard deviations of a sample mean, by
  * the reference's own samples, and the rounding to codes. */
-static bool check_exact(const struct work *w, struct result *out, struct err *e)
+static bool check_exact(struct work *w, struct result *out, struct err *e)
 {
     static const double allowed_sd = 6;
     const struct submitted_image *s = student(w, 0);
@@ -469,9 +454,12 @@ static bool check_exact(const struct work *w, struct result *out, struct err *e)
     return true;
 }
 
-static bool check_noise(const struct work *w, struct result *out, struct err *e)
+static bool check_noise(struct work *w, struct result *out, struct err *e)
 {
     const struct submitted_image *p = student(w, 0), *q = student(w, 1);
+    struct submitted_image *rp = &w->compare[0], *rq = &w->compare[1];
+    struct interval i;
+    struct err why;
     snprintf(out->expected, sizeof out->expected,
              "the noise of %s over that of %s as with independent samples, within a factor of %.3g",
              image_of(w, 0)->name, image_of(w, 1)->name, exp(w->check->log_ratio.full));
@@ -480,49 +468,40 @@ static bool check_noise(const struct work *w, struct result *out, struct err *e)
                  "the two files are the same, though one has more samples");
         return true;
     }
-    unsigned char *use = usable(w, out, e);
-    struct submitted_image rp = {0}, rq = {0};
-    struct interval i;
-    struct err why;
-    bool ok = use != NULL && submitted_image_from(reference(w, 0), p, &rp, e) &&
-              submitted_image_from(reference(w, 1), q, &rq, e);
-    if (ok && !difference_related(q, &rq, use)) {
+    if (!find_usable(w, out, e) || !submitted_image_from(reference(w, 0), p, rp, e) ||
+        !submitted_image_from(reference(w, 1), q, rq, e))
+        return false;
+    if (!difference_related(q, rq, w->use)) {
         snprintf(out->seen, sizeof out->seen, "%s is no image of its scene", image_of(w, 1)->name);
         out->more = 0;
-    } else if (ok && difference_noise(p, &rp, q, &rq, use, w->g->alpha, &i, &why)) {
+    } else if (difference_noise(p, rp, q, rq, w->use, w->g->alpha, &i, &why)) {
         snprintf(out->seen, sizeof out->seen, "%.3g times as much (%.3g to %.3g)", exp(i.value),
                  exp(i.lo), exp(i.hi));
         out->share = 1;
         out->more = 0; /* clipped pixels are left out of it */
         judge(w, &w->check->log_ratio, &i, 0, out);
         settle(w, false, out);
-    } else if (ok) {
+    } else {
         snprintf(out->seen, sizeof out->seen, "%.390s", why.msg);
     }
-    submitted_image_free(&rp);
-    submitted_image_free(&rq);
-    free(use);
-    return ok;
+    return true;
 }
 
 /* By what the rule gives for a program with as much noise: `ours` is the mean of our counts. */
-static bool widen_count(const struct work *w, double ours, struct interval *count,
-                        struct result *out, struct err *e)
+static bool widen_count(struct work *w, double ours, struct interval *count, struct result *out,
+                        struct err *e)
 {
     struct stopping rule;
-    unsigned char *use = usable(w, out, e);
-    bool ok = use != NULL && stopping_of(w, use, &rule, e);
-    if (ok) {
-        count->lo -= fmax(0, rule.most / ours - 1);
-        count->hi -= fmin(0, rule.least / ours - 1);
-        stopping_rule_free(&rule);
-    }
-    free(use);
+    if (!find_usable(w, out, e) || !stopping_of(w, &rule, e))
+        return false;
+    count->lo -= fmax(0, rule.most / ours - 1);
+    count->hi -= fmin(0, rule.least / ours - 1);
+    stopping_rule_free(&rule);
     out->more = 0;
-    return ok;
+    return true;
 }
 
-static bool check_rates(const struct work *w, struct result *out, struct err *e)
+static bool check_rates(struct work *w, struct result *out, struct err *e)
 {
     const struct rubric_check *c = w->check;
     const struct made *made = &w->g->h->made[c->images[0]];
@@ -593,7 +572,7 @@ void grade_checks_growth(const struct grading *g, const struct rubric_check *c, 
              large, small, large_error, small_error, exp(least));
 }
 
-static bool check_growth(const struct work *w, struct result *out, struct err *e)
+static bool check_growth(struct work *w, struct result *out, struct err *e)
 {
     if (!check_equal(w, out, e))
         return false;
@@ -641,12 +620,11 @@ static bool expect_noise(const struct work *w, struct err *e)
 bool grade_checks_run(const struct grading *g, const struct rubric_check *check, int set,
                       struct result *out, struct err *e)
 {
-    static bool (*const kinds[NUM_CHECK_KINDS])(const struct work *, struct result *,
-                                                struct err *) = {
+    static bool (*const kinds[NUM_CHECK_KINDS])(struct work *, struct result *, struct err *) = {
         [CHECK_EQUAL] = check_equal,  [CHECK_AGREE] = check_agree, [CHECK_SUM] = check_sum,
         [CHECK_EXACT] = check_exact,  [CHECK_NOISE] = check_noise, [CHECK_RATES] = check_rates,
         [CHECK_GROWTH] = check_growth};
-    const struct work w = {g, check, set};
+    struct work w = {.g = g, .check = check, .set = set};
     *out = (struct result){.judged = true, .image = check->images[0]};
     for (int k = 0; k < check->num_images; k++) {
         int i = check->images[k];
@@ -657,7 +635,11 @@ bool grade_checks_run(const struct grading *g, const struct rubric_check *check,
         out->judged = g->h->made[i].end != SANDBOX_LOST;
         return true;
     }
-    return expect_noise(&w, e) && kinds[check->kind](&w, out, e);
+    bool ok = expect_noise(&w, e) && kinds[check->kind](&w, out, e);
+    free(w.use);
+    submitted_image_free(&w.compare[0]);
+    submitted_image_free(&w.compare[1]);
+    return ok;
 }
 
 void result_free(struct result *r)
