@@ -160,14 +160,15 @@ $(BUILD)/libassay.so.$(LIBRARY_ABI): $(call obj,$(BUILD),$(LIBRARY_SOURCES)) too
 	  -o $@ $(filter %.o,$^) $(LIBS) -ldl && ln -sf $(@F) $(BUILD)/libassay.so
 library: $(BUILD)/libassay.so.$(LIBRARY_ABI)
 
-# Everything below one directory, with the compiler and the flags that are set for it: $(call tree,DIRECTORY,PACKAGES).
+# Everything below one directory, with the compiler and the flags that are set for it: $(call tree,DIRECTORY,PACKAGES,KERNELS),
+# KERNELS: where its kernels come from, if not from there.
 define tree
 $(1)/%.c.o: %.c | $(2)
 	$$(compile_c)
 $(1)/%.cc.o: %.cc | $(2)
 	$$(compile_cxx)
 $(foreach k,$(BY_ISA),$(foreach i,$(call isas_of,$(k)),$(eval $(call kernel_object,$(1),$(k),$(i),$(2)))))
-$(1)/libassay.a: $(call obj,$(1),$(SOURCES) $(KERNELS))
+$(1)/libassay.a: $(call obj,$(1),$(SOURCES)) $(call obj,$(or $(3),$(1)),$(KERNELS))
 	$$(archive)
 $(1)/pathtracer: $(1)/renderer/pathtracer/pathtracer.c.o $(1)/libassay.a
 	$$(link)
