@@ -7,7 +7,6 @@
 #include "reference/replicates/replicate_images.h"
 #include "reference/base/process.h"
 
-#include "renderer/image/image_oiio.h"
 #include "renderer/base/fs.h"
 #include "renderer/base/progress.h"
 
@@ -76,40 +75,6 @@ static bool run_process(struct engine_job *j, uint32_t seed, const char *out, st
     return ok;
 }
 
-/* RGB of an image, packed; the caller frees. Values may be negative: a renderer of spectra has
- * colours outside the gamut, and only their mean has to make sense. */
-static float *read_image(struct engine_job *j, const char *path, struct err *e)
-{
-    struct image im = {0};
-    bool half;
-    float *out = NULL;
-    if (!image_read(path, &im, &half, e))
-        return NULL;
-    j->half = j->half || half;
-    int at[3] = {image_channel(&im, "R"), image_channel(&im, "G"), image_channel(&im, "B")};
-    size_t values = 3 * (size_t)im.width * (size_t)im.height, bad = values;
-    if (im.width != j->suite->width || im.height != j->suite->height)
-        err_set(e, "%s: %d x %d pixels, not %d x %d", path, im.width, im.height, j->suite->width,
-                j->suite->height);
-    else if (at[0] < 0 || at[1] < 0 || at[2] < 0)
-        err_set(e, "%s: no channels R, G and B", path);
-    else if ((out = malloc(values * sizeof *out)) == NULL)
-        err_set(e, "%s: out of memory", path);
-    for (size_t i = 0; out != NULL && i < values; i++) {
-        out[i] = (float)(j->en->scale * im.data[i / 3 * (size_t)im.channels + (size_t)at[i % 3]]);
-        if (!isfinite(out[i]) && bad == values)
-            bad = i;
-    }
-    if (out != NULL && bad < values) {
-        err_set(e, "%s: pixel %zu,%zu is not finite", path, bad / 3 % (size_t)im.width,
-                bad / 3 / (size_t)im.width);
-        free(out);
-        out = NULL;
-    }
-    image_free(&im);
-    return out;
-}
-
 /* Image k: one run, or one for each channel with a seed of its own, of which that channel counts. */
 static float *render_image(struct engine_job *j, int k, struct err *e)
 {
@@ -120,7 +85,8 @@ static float *render_image(struct engine_job *j, int k, struct err *e)
     for (j->channel = 0; j->channel < runs; j->channel++) {
         const size_t c = (size_t)j->channel;
         float *px = run_process(j, replicate_seed(j->opt->seed, runs * k + j->channel), path.s, e)
-                        ? read_image(j, path.s, e)
+                        ? replicate_images_read_any(path.s, j->suite->width, j->suite->height,
+                                                    j->en->scale, &j->half, e)
                         : NULL;
         if (px == NULL) {
             free(out);

@@ -1,6 +1,6 @@
 #include "replicate_images.h"
 
-#include "renderer/image/image.h"
+#include "renderer/image/image_oiio.h"
 
 #include <assert.h>
 #include <math.h>
@@ -18,34 +18,54 @@ void replicate_images_path(const char *dir, const char *prefix, int number,
     snprintf(path, REPLICATE_IMAGE_PATH, "%s/%s_%04d.exr", dir, prefix, number);
 }
 
-float *replicate_images_read(const char *path, int width, int height, bool below_zero,
-                             struct err *e)
+/* Of any file that is read where `half` is asked for, else of EXR with 32 bits. */
+static float *read_rgb(const char *path, int width, int height, bool below_zero, double scale,
+                       bool *half, struct err *e)
 {
     struct image im = {0};
-    bool half;
-    if (!image_read_exr(path, &im, &half, e))
+    bool fewer_bits;
+    if (!(half != NULL ? image_read : image_read_exr)(path, &im, &fewer_bits, e))
         return NULL;
     const size_t values = 3 * (size_t)im.width * (size_t)im.height;
     const int at[3] = {image_channel(&im, "R"), image_channel(&im, "G"), image_channel(&im, "B")};
+    const bool has_rgb = at[0] >= 0 && at[1] >= 0 && at[2] >= 0;
     bool ok =
         (im.width == width && im.height == height) ||
         err_set(e, "%s: %d x %d pixels, not %d x %d", path, im.width, im.height, width, height);
-    ok = ok && ((!half && at[0] >= 0 && at[1] >= 0 && at[2] >= 0) ||
-                err_set(e, "%s: not the 32-bit R, G, B that was asked for", path));
+    if (ok && half != NULL)
+        ok = has_rgb || err_set(e, "%s: no channels R, G and B", path);
+    else if (ok)
+        ok = (has_rgb && !fewer_bits) ||
+             err_set(e, "%s: not the 32-bit R, G, B that was asked for", path);
     float *rgb_out = ok ? malloc(values * sizeof *rgb_out) : NULL;
     ok = ok && (rgb_out != NULL || err_set(e, "%s: out of memory", path));
     for (size_t i = 0; ok && i < values; i++) {
-        rgb_out[i] = im.data[i / 3 * (size_t)im.channels + (size_t)at[i % 3]];
+        rgb_out[i] =
+            (float)(scale * (double)im.data[i / 3 * (size_t)im.channels + (size_t)at[i % 3]]);
         ok = (isfinite(rgb_out[i]) && (rgb_out[i] >= 0 || below_zero)) ||
              err_set(e, "%s: pixel %d,%d is %s", path, (int)(i / 3 % (size_t)im.width),
                      (int)(i / 3 / (size_t)im.width),
                      below_zero ? "not finite" : "negative or not finite");
     }
+    if (half != NULL)
+        *half |= fewer_bits;
     image_free(&im);
     if (ok)
         return rgb_out;
     free(rgb_out);
     return NULL;
+}
+
+float *replicate_images_read(const char *path, int width, int height, bool below_zero,
+                             struct err *e)
+{
+    return read_rgb(path, width, height, below_zero, 1, NULL, e);
+}
+
+float *replicate_images_read_any(const char *path, int width, int height, double scale, bool *half,
+                                 struct err *e)
+{
+    return read_rgb(path, width, height, true, scale, half, e);
 }
 
 bool replicate_images_write(const char *path, int width, int height, const float *pixels_rgb,

@@ -24,6 +24,10 @@ void replicate_images_path(const char *dir, const char *prefix, int number,
  * not finite or, without `below_zero`, negative. */
 NODISCARD float *replicate_images_read(const char *path, int width, int height, bool below_zero,
                                        struct err *e);
+/* The same of any format that is read and of any finite values, times scale; *half is set where the file has fewer than 32 bits. Values
+ * may be negative: a renderer of spectra has colours outside the gamut, and only their mean has to make sense. */
+NODISCARD float *replicate_images_read_any(const char *path, int width, int height, double scale,
+                                           bool *half, struct err *e);
 /* The same bits as a file, which appears whole. */
 NODISCARD bool replicate_images_write(const char *path, int width, int height,
                                       const float *pixels_rgb, struct err *e);
