@@ -1,5 +1,7 @@
 #include "pixel_filter.h"
 
+#include "pixel_filter_simd.h"
+
 #include <assert.h>
 #include <math.h>
 #include <stdio.h>
@@ -37,18 +39,36 @@ static double half_integral(const struct pixel_filter *f, double x)
            x * exp(-0.5 * edge * edge);
 }
 
-/* By bisection; share of half of f in [0,1]. */
-static double half_quantile(const struct pixel_filter *f, double share)
+/* From where to the radius the share in [0, 1/2] of f lies: by bisection. */
+static double quantile(const struct pixel_filter *f, double share)
 {
-    double lo = 0, hi = f->radius, wanted = share * half_integral(f, f->radius);
-    for (int i = 0; i < 60; i++) {
+    double lo = 0, hi = f->radius;
+    for (int i = 0; i < 52; i++) {
         double m = 0.5 * (lo + hi);
-        if (half_integral(f, m) < wanted)
+        if (0.5 - f->top * half_integral(f, m) > share)
             lo = m;
         else
             hi = m;
     }
     return hi;
+}
+
+/* Neighbouring cubics have value and slope in common. The share of a place is then met to 1e-7. */
+static void make_table(struct pixel_filter *f)
+{
+    enum { PARTS = 1 << PIXEL_FILTER_BITS };
+    double x0 = quantile(f, PIXEL_FILTER_LEAST);
+    for (int i = 0; i < PIXEL_FILTER_BINS; i++) {
+        double width = ldexp(1.0 / PARTS, i / PARTS - 25),
+               x1 = quantile(f, width * (PARTS + i % PARTS + 1));
+        double s0 = -width / pixel_filter_value(f, x0), s1 = -width / pixel_filter_value(f, x1);
+        float *c = f->cubic[i];
+        c[0] = (float)x0;
+        c[1] = (float)s0;
+        c[2] = (float)(3 * (x1 - x0) - 2 * s0 - s1);
+        c[3] = (float)(s0 + s1 - 2 * (x1 - x0));
+        x0 = x1;
+    }
 }
 
 bool pixel_filter_make(struct pixel_filter *f, enum pixel_filter_kind kind, double radius,
@@ -65,12 +85,7 @@ bool pixel_filter_make(struct pixel_filter *f, enum pixel_filter_kind kind, doub
     f->radius = radius;
     f->sigma = kind == PIXEL_FILTER_GAUSS ? sigma : 0;
     f->top = 0.5 / half_integral(f, radius);
-    enum { HALF = PIXEL_FILTER_BINS / 2 };
-    for (int i = 0; i <= HALF; i++) {
-        double x = i == 0 ? 0 : i == HALF ? radius : half_quantile(f, (double)i / HALF);
-        f->quantile[HALF + i] = (float)x;
-        f->quantile[HALF - i] = (float)-x;
-    }
+    make_table(f);
     return true;
 }
 
@@ -128,26 +143,10 @@ double pixel_filter_value(const struct pixel_filter *f, double x)
     return fabs(x) <= 0.5;
 }
 
-/* Newton's method, and halves where that leaves the bin. */
 float pixel_filter_sample(const struct pixel_filter *f, float u)
 {
     assert(f->radius > 0 && u >= 0 && u < 1);
-    int i = (int)(u * PIXEL_FILTER_BINS);
-    double lo = (double)f->quantile[i], hi = (double)f->quantile[i + 1], x = 0.5 * (lo + hi);
-    for (int k = 0; k < 30; k++) {
-        double more = 0.5 + copysign(f->top * half_integral(f, fabs(x)), x) - (double)u;
-        if (more > 0)
-            hi = x;
-        else
-            lo = x;
-        double next = x - more / pixel_filter_value(f, x);
-        if (!(next > lo && next < hi))
-            next = 0.5 * (lo + hi);
-        if (fabs(next - x) < 1e-7)
-            break;
-        x = next;
-    }
-    return (float)x;
+    return filter_places(f, u);
 }
 
 double pixel_filter_sharing(const struct pixel_filter *f, int order)

@@ -5,7 +5,15 @@
 
 #include "renderer/base/err.h"
 
-enum { PIXEL_FILTER_BINS = 256, PIXEL_FILTER_TEXT = 64 };
+enum {
+    PIXEL_FILTER_TEXT = 64,
+    /* Of the table: shares of one side from 2^-25 to 1/2 are cut into bins by their exponent and so many bits behind it. */
+    PIXEL_FILTER_CUBIC = 4,
+    PIXEL_FILTER_BITS = 4,
+    PIXEL_FILTER_BINS = 24 << PIXEL_FILTER_BITS,
+    PIXEL_FILTER_FIRST = (127 - 25) << PIXEL_FILTER_BITS /* the same bits of 2^-25 */
+};
+#define PIXEL_FILTER_LEAST 0x1p-25f
 
 enum pixel_filter_kind { PIXEL_FILTER_BOX, PIXEL_FILTER_TENT, PIXEL_FILTER_GAUSS };
 
@@ -15,8 +23,9 @@ struct pixel_filter {
     enum pixel_filter_kind kind;
     double radius, sigma; /* pixels; radius 0: the box of one pixel */
     double top;           /* f's factor, so that its integral is 1 */
-    float quantile[PIXEL_FILTER_BINS +
-                   1]; /* between each and the next lies 1/BINS of f: where to begin */
+    /* How far from the centre the shares of a bin lie, as cubics of the way through it (pixel_filter_simd.h); 1/2 is a
+     * bin, and rows are fetched in pairs. */
+    float cubic[PIXEL_FILTER_BINS + 2][PIXEL_FILTER_CUBIC];
 };
 
 extern const char *const pixel_filter_names[]; /* by enum pixel_filter_kind; end with NULL */

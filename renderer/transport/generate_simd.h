@@ -4,17 +4,8 @@
 
 #include "paths_simd.h"
 #include "renderer/scene/camera_simd.h"
+#include "renderer/scene/pixel_filter_simd.h"
 #include "renderer/scene/shape_simd.h"
-
-/* A number of [0,1) becomes a place, from the pixel's corner on, by its filter, which needs exp(): one at a time. */
-static __attribute__((noinline)) vf filter_places(const struct pixel_filter *f, vf u)
-{
-    float place[LANES];
-    vf_store_any(place, u);
-    for (int i = 0; i < LANES; i++)
-        place[i] = 0.5f + pixel_filter_sample(f, place[i]);
-    return vf_load_any(place);
-}
 
 /* Camera rays for all lanes. */
 static void generate(const struct integrator *it, struct batch *b, int n)
@@ -33,7 +24,7 @@ static void generate(const struct integrator *it, struct batch *b, int n)
         load_numbers(b, k / LANES, u);
         if (c->filter.radius > 0)
             for (int axis = 0; axis < 2; axis++)
-                u[axis] = filter_places(&c->filter, u[axis]);
+                u[axis] = 0.5f + filter_places(&c->filter, u[axis]);
         vi pixel = vi_load_any(b->pixel + k), row = vi_divide(pixel, c->width);
         vf x = vf_of_int(pixel - row * c->width) + u[0], y = vf_of_int(row) + u[1];
         vec3v o, d;

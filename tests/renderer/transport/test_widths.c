@@ -141,6 +141,7 @@ static struct scene textured(void)
 struct how {
     struct integrator_options opt;
     float lens;
+    const char *filter; /* NULL: box */
     int spp, threads;
     int width, height; /* 0: WIDTH, HEIGHT */
 };
@@ -154,6 +155,7 @@ static struct moments image_of(const struct scene *s, const struct how *how)
     assert_true(camera_init(&c, s, width, height, &e));
     c.lens_radius = how->lens;
     c.focal_distance = 3;
+    assert_true(how->filter == NULL || pixel_filter_parse(how->filter, &c.filter, &e));
     struct render_options o = {.integrator = how->opt,
                                .width = width,
                                .height = height,
@@ -244,6 +246,7 @@ TEST(bits_are_those_of_one_lane)
                             .survival = 0.6f,
                             .sampler = {(enum sampler_kind)sampler, 77}},
                     .lens = sampler == SAMPLER_SOBOL ? 0.1f : 0,
+                    .filter = direct == DIRECT_LIGHT ? "gauss:0.5:2" : NULL,
                     .spp = 2,
                     .threads = 1};
                 compare(&s, how);
