@@ -127,7 +127,7 @@ static json_t *gradescope(const json_t *grade)
 }
 
 /* RFC 4180; a leading = + - @ would be a formula to a spreadsheet. */
-static void csv_link_text(FILE *f, const char *text)
+static void csv_text(FILE *f, const char *text)
 {
     fputc('"', f);
     if (text[0] != '\0' && strchr("=+-@\t", text[0]) != NULL)
@@ -149,14 +149,14 @@ static void write_csv(FILE *f, const json_t *grades)
     fputs("id,points,of,remarks", f);
     json_each(c, json_object_get(first, "checks")) {
         fputc(',', f);
-        csv_link_text(f, member_or_empty(c, "name"));
+        csv_text(f, member_or_empty(c, "name"));
     }
     fputs("\r\n", f);
     json_each(g, grades) {
-        csv_link_text(f, member_or_empty(g, "id"));
+        csv_text(f, member_or_empty(g, "id"));
         fprintf(f, ",%.2f,%g,", member_number(g, "points"), member_number(g, "of"));
-        csv_link_text(f, member_or_empty(g, "trouble")[0] != '\0' ? member_or_empty(g, "trouble")
-                                                                  : member_or_empty(g, "wrong"));
+        csv_text(f, member_or_empty(g, "trouble")[0] != '\0' ? member_or_empty(g, "trouble")
+                                                             : member_or_empty(g, "wrong"));
         json_each(c, json_object_get(g, "checks"))
             fprintf(f, ",%.2f", member_number(c, "points"));
         fputs("\r\n", f);

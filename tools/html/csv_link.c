@@ -2,6 +2,7 @@
 
 #include <ctype.h>
 #include <math.h>
+#include <stdarg.h>
 #include <string.h>
 
 struct csv csv_link_open(FILE *f, const char *name, const char *header)
@@ -63,6 +64,25 @@ void csv_link_line(struct csv *c)
 {
     fputs("%0D%0A", c->f);
     c->in_line = false;
+}
+
+void csv_link_row(struct csv *c, const char *letters, ...)
+{
+    va_list values;
+    va_start(values, letters);
+    for (; *letters != '\0'; letters++) {
+        if (*letters == 't') {
+            csv_link_text(c, va_arg(values, const char *));
+        } else if (*letters == 'n') {
+            csv_link_number(c, va_arg(values, double));
+        } else {
+            const json_t *object = va_arg(values, const json_t *);
+            (*letters == 'm' ? csv_link_member : csv_link_interval)(c, object,
+                                                                    va_arg(values, const char *));
+        }
+    }
+    va_end(values);
+    csv_link_line(c);
 }
 
 void csv_link_close(struct csv *c)

@@ -22,6 +22,8 @@ void csv_link_member(struct csv *c, const json_t *object, const char *name);
 /* The two numbers of the member `name`, or two empty fields. */
 void csv_link_interval(struct csv *c, const json_t *object, const char *name);
 void csv_link_line(struct csv *c);
+/* A whole line, by a letter for each: t a text, n a double, m and i an object and a name, as above. */
+void csv_link_row(struct csv *c, const char *letters, ...);
 /* The link's text: "CSV". */
 void csv_link_close(struct csv *c);
 

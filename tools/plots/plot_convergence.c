@@ -71,13 +71,9 @@ static void write_plot_csv(FILE *f, const json_t *engines, bool against_time)
             ? csv_link_open(f, "error_time.csv", "engine,cpu_seconds,rmse,rmse_low,rmse_high")
             : csv_link_open(f, "error_samples.csv", "engine,samples,rmse,rmse_low,rmse_high");
     json_each(j, engines)
-        json_each(g, json_object_get(j, "rungs")) {
-            csv_link_text(&csv, member_text(j, "engine"));
-            csv_link_number(&csv, rung_x(j, g, against_time));
-            csv_link_number(&csv, member_number(g, "rmse"));
-            csv_link_interval(&csv, g, "rmse_ci");
-            csv_link_line(&csv);
-        }
+        json_each(g, json_object_get(j, "rungs"))
+            csv_link_row(&csv, "tnmi", member_text(j, "engine"), rung_x(j, g, against_time), g,
+                         "rmse", g, "rmse_ci");
     csv_link_close(&csv);
 }
 

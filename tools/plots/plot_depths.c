@@ -70,12 +70,8 @@ static void write_caption(FILE *f, const json_t *depths)
             "shown, not judged. ",
             known, json_array_size(rungs), largest);
     struct csv csv = csv_link_open(f, "depths.csv", "depth,mean,standard_error,closed_form");
-    static const char *const member[] = {"depth", "mean", "se", "truth"};
-    for (size_t i = 0; i < json_array_size(rungs); i++) {
-        for (size_t k = 0; k < 4; k++)
-            csv_link_member(&csv, json_array_get(rungs, i), member[k]);
-        csv_link_line(&csv);
-    }
+    json_each(g, rungs)
+        csv_link_row(&csv, "mmmm", g, "depth", g, "mean", g, "se", g, "truth");
     csv_link_close(&csv);
     fputs("</figcaption>", f);
 }

@@ -69,11 +69,10 @@ static void write_tile_csv(FILE *f, const json_t *claim)
     struct csv csv = csv_link_open(f, "tiles.csv", "x,y,t,log10_p");
     for (size_t i = 0; columns > 0 && i < json_array_size(p); i++) {
         const json_t *one = json_array_get(p, i);
-        csv_link_number(&csv, side * (double)(i % columns));
-        csv_link_number(&csv, side * (double)(i / columns));
-        csv_link_number(&csv, json_is_number(one) ? json_number_value(json_array_get(t, i)) : NAN);
-        csv_link_number(&csv, json_is_number(one) ? json_number_value(one) : NAN);
-        csv_link_line(&csv);
+        const bool known = json_is_number(one);
+        csv_link_row(&csv, "nnnn", side * (double)(i % columns), side * (double)(i / columns),
+                     known ? json_number_value(json_array_get(t, i)) : NAN,
+                     known ? json_number_value(one) : NAN);
     }
     csv_link_close(&csv);
 }
@@ -192,11 +191,8 @@ void plot_power(FILE *f, const json_t *claim)
         "of the time at the MDB, %s. ",
         html_percent_plain(mdb).s);
     struct csv csv = csv_link_open(f, "power.csv", "bias,power");
-    for (int i = 0; i < num; i++) {
-        csv_link_number(&csv, bias[i]);
-        csv_link_number(&csv, power_at(&p, bias[i]));
-        csv_link_line(&csv);
-    }
+    for (int i = 0; i < num; i++)
+        csv_link_row(&csv, "nn", bias[i], power_at(&p, bias[i]));
     csv_link_close(&csv);
     fputs("</figcaption></figure>\n", f);
 }

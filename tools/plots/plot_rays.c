@@ -86,13 +86,8 @@ bool plot_rays(FILE *f, const json_t *claims, struct err *e)
             f);
         struct csv csv =
             csv_link_open(f, "rays.csv", "scene,rays,box_tests_per_ray,primitive_tests_per_ray");
-        for (size_t i = 0; i < num; i++) {
-            csv_link_text(&csv, bar[i].scene);
-            csv_link_number(&csv, bar[i].rays);
-            csv_link_number(&csv, bar[i].boxes);
-            csv_link_number(&csv, bar[i].primitives);
-            csv_link_line(&csv);
-        }
+        for (size_t i = 0; i < num; i++)
+            csv_link_row(&csv, "tnnn", bar[i].scene, bar[i].rays, bar[i].boxes, bar[i].primitives);
         csv_link_close(&csv);
         fputs("</figcaption></figure>\n</section>\n", f);
     }

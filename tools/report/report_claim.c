@@ -61,12 +61,8 @@ static void write_histogram(FILE *f, const json_t *claim)
                                                                  : "",
         h.below_5_percent, 0.05 * h.num_tiles);
     struct csv csv = csv_link_open(f, "p_values.csv", "p_from,p_to,tiles");
-    for (int b = 0; b < h.bins; b++) {
-        csv_link_number(&csv, (double)b / h.bins);
-        csv_link_number(&csv, (double)(b + 1) / h.bins);
-        csv_link_number(&csv, count[b]);
-        csv_link_line(&csv);
-    }
+    for (int b = 0; b < h.bins; b++)
+        csv_link_row(&csv, "nnn", (double)b / h.bins, (double)(b + 1) / h.bins, (double)count[b]);
     csv_link_close(&csv);
     fputs("</figcaption></figure>\n", f);
 }

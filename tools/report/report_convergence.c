@@ -38,20 +38,13 @@ static void write_number(FILE *f, const json_t *object, const char *name, double
 
 static void write_csv(FILE *f, const json_t *engines)
 {
-    static const char *const number[] = {"spp", "rmse", "variance", "bias", "cpu_s", "efficiency"};
     struct csv csv =
         csv_link_open(f, "convergence.csv",
                       "engine,samples,rmse,variance,bias,cpu_s,efficiency,rmse_low,rmse_high");
-    json_each(j, engines) {
-        const json_t *rungs = json_object_get(j, "rungs");
-        json_each(g, rungs) {
-            csv_link_text(&csv, member_text(j, "engine"));
-            for (size_t n = 0; n < sizeof number / sizeof *number; n++)
-                csv_link_member(&csv, g, number[n]);
-            csv_link_interval(&csv, g, "rmse_ci");
-            csv_link_line(&csv);
-        }
-    }
+    json_each(j, engines)
+        json_each(g, json_object_get(j, "rungs"))
+            csv_link_row(&csv, "tmmmmmmi", member_text(j, "engine"), g, "spp", g, "rmse", g,
+                         "variance", g, "bias", g, "cpu_s", g, "efficiency", g, "rmse_ci");
     csv_link_close(&csv);
 }
 

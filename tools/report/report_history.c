@@ -121,16 +121,9 @@ static void write_csv(FILE *f, const struct history *h)
             if (p->run < from)
                 continue;
             history_commit(&h->run[p->run], commit, sizeof commit);
-            csv_link_text(&csv, s->scene);
-            csv_link_text(&csv, s->a);
-            csv_link_text(&csv, s->b);
-            csv_link_text(&csv, commit);
-            csv_link_text(&csv, member_text(h->run[p->run].results, "date"));
-            const double v[] = {p->difference,     p->low,     p->high,
-                                p->variance_ratio, p->seconds, p->efficiency};
-            for (size_t n = 0; n < sizeof v / sizeof *v; n++)
-                csv_link_number(&csv, v[n]);
-            csv_link_line(&csv);
+            csv_link_row(&csv, "tttttnnnnnn", s->scene, s->a, s->b, commit,
+                         member_text(h->run[p->run].results, "date"), p->difference, p->low,
+                         p->high, p->variance_ratio, p->seconds, p->efficiency);
         }
     }
     csv_link_close(&csv);

@@ -128,14 +128,11 @@ static void write_csv(const struct page *p)
         p->f, "alike.csv", "scene,tested,against,verdict,flip_hdr,flip_ldr,idiff_percent,idiff");
     for (size_t i = 0; i < p->num_alike; i++) {
         const struct page_alike *n = &p->alike[i];
-        static const char *const text[] = {"scene", "a", "b", "verdict"};
-        for (size_t k = 0; k < sizeof text / sizeof *text; k++)
-            csv_link_text(&csv, member_text(n->claim.json, text[k]));
-        csv_link_number(&csv, n->is.has_flip ? n->is.hdr : NAN);
-        csv_link_number(&csv, n->is.has_flip ? n->is.ldr : NAN);
-        csv_link_number(&csv, n->is.idiff_percent);
-        csv_link_text(&csv, n->is.idiff_differs ? "FAIL" : "pass");
-        csv_link_line(&csv);
+        const json_t *c = n->claim.json;
+        csv_link_row(&csv, "ttttnnnt", member_text(c, "scene"), member_text(c, "a"),
+                     member_text(c, "b"), member_text(c, "verdict"),
+                     n->is.has_flip ? n->is.hdr : NAN, n->is.has_flip ? n->is.ldr : NAN,
+                     n->is.idiff_percent, n->is.idiff_differs ? "FAIL" : "pass");
     }
     csv_link_close(&csv);
 }

@@ -1,5 +1,6 @@
 #include "report_internal.h"
 
+#include "tools/base/text.h"
 #include "tools/compare/region.h"
 #include "tools/html/csv_link.h"
 #include "tools/html/html.h"
@@ -28,72 +29,57 @@ void report_badge(FILE *f, const struct claim_ref *claim)
                judged ? member_text(claim->json, "verdict") : "not judged");
 }
 
-/* A <td>; its heading stands in it too, for where a claim is a card. */
-static void open_cell(FILE *f, const struct column *column, const char *style)
-{
-    html_print(f, "<td class=\"%s\" data-label=\"%s\">", style, column->page);
-}
-
 static void write_cell(FILE *f, const struct column *column, const struct claim_ref *claim)
 {
     const json_t *c = claim->json;
     const char *key = column->key;
-    switch (column->kind) {
-    case COLUMN_VERDICT:
-        fputs("<td>", f);
-        report_badge(f, claim);
-        break;
-    case COLUMN_SCENE:
+    const bool is_name = column->kind == COLUMN_TESTED || column->kind == COLUMN_REFERENCE;
+    if (column->kind == COLUMN_SCENE) {
         fprintf(f, "<th scope=\"row\"><a href=\"#claim-%zu\">", claim->index);
         html_name(f, member_text(c, key));
         fputs("</a></th>", f);
         return;
-    case COLUMN_TESTED:
-        open_cell(f, column, "name");
-        html_name(f, member_text(c, key));
-        break;
-    case COLUMN_REFERENCE:
-        open_cell(f, column, "name");
-        report_reference(f, claim);
-        break;
-    case COLUMN_TEXT:
-        open_cell(f, column, "text");
-        html_text(f, member_text(c, key));
-        break;
-    case COLUMN_PLOT:
+    }
+    /* The heading stands in a cell too, for where a claim is a card. */
+    if (column->kind == COLUMN_VERDICT || column->kind == COLUMN_PLOT)
         fputs("<td>", f);
+    else
+        html_print(f, "<td class=\"%s\" data-label=\"%s\">",
+                   is_name                       ? "name"
+                   : column->kind == COLUMN_TEXT ? "text"
+                                                 : "num",
+                   column->page);
+    switch (column->kind) {
+    case COLUMN_VERDICT: report_badge(f, claim); break;
+    case COLUMN_TESTED: html_name(f, member_text(c, key)); break;
+    case COLUMN_REFERENCE: report_reference(f, claim); break;
+    case COLUMN_TEXT: html_text(f, member_text(c, key)); break;
+    case COLUMN_PLOT:
         plot_interval(f, c);
         if (strcmp(member_text(c, "verdict"), "DIFFERENT") == 0 &&
             fabs(member_end(c, "ci", 0)) < member_number(c, "margin_global") &&
             fabs(member_end(c, "ci", 1)) < member_number(c, "margin_global"))
             fputs("<small>because of a part of it</small>", f);
         break;
-    case COLUMN_DIFFERENCE:
-        open_cell(f, column, "num");
-        fputs(html_percent_column(member_number(c, key)).s, f);
-        break;
+    case COLUMN_DIFFERENCE: fputs(html_percent_column(member_number(c, key)).s, f); break;
     case COLUMN_INTERVAL:
-        open_cell(f, column, "num");
         fprintf(f, "%s to %s", html_percent_column(member_end(c, key, 0)).s,
                 html_percent_column(member_end(c, key, 1)).s);
         break;
     case COLUMN_PERCENT:
-        open_cell(f, column, "num");
-        if (member_number(c, key) >= region_mdb_none)
-            fputs("none", f);
-        else
-            fputs(html_number(100 * member_number(c, key)).s, f);
+        fputs(member_number(c, key) >= region_mdb_none ? "none"
+                                                       : html_number(100 * member_number(c, key)).s,
+              f);
         break;
     case COLUMN_SECONDS:
-        open_cell(f, column, "num");
-        if (json_object_get(c, key) != NULL)
-            fputs(html_duration(member_number(c, key)).s, f);
-        break;
     case COLUMN_NUMBER:
-        open_cell(f, column, "num");
         if (json_object_get(c, key) != NULL)
-            fputs(html_number(member_number(c, key)).s, f);
+            fputs((column->kind == COLUMN_SECONDS ? html_duration
+                                                  : html_number)(member_number(c, key))
+                      .s,
+                  f);
         break;
+    case COLUMN_SCENE:
     case COLUMN_MARK: break;
     }
     fputs("</td>", f);
@@ -121,18 +107,15 @@ static void write_row(FILE *f, const struct claim_ref *claim)
 /* Headings of the page, for html_table_open(), or of CSV. */
 static const char *headings(bool is_page, char out[512])
 {
-    size_t n = 0;
+    out[0] = '\0';
     for (size_t i = 0; i < results_num_columns; i++) {
         const struct column *c = &results_columns[i];
-        const char *name = is_page ? c->page : c->csv;
+        const char *name = is_page ? c->page : c->csv, *between = is_page ? "|" : ",";
         if (name != NULL)
-            n += (size_t)snprintf(out + n, 512 - n, "%s%s%s",
-                                  n == 0    ? ""
-                                  : is_page ? "|"
-                                            : ",",
-                                  is_page && column_is_number(c) ? ">" : "", name);
-        assert(n < 512);
+            text_append(out, 512, "%s%s%s", out[0] != '\0' ? between : "",
+                        is_page && column_is_number(c) ? ">" : "", name);
     }
+    assert(strlen(out) < 511);
     return out;
 }
 
