@@ -164,13 +164,16 @@ static void announce(struct validation *v, struct claim_run *t)
     const json_t *told = row_to_tell(t->result);
     const char *verdict = member_text(told, "verdict"), *error = member_text(told, "error");
     char line[1024];
+    pthread_mutex_lock(&v->lock);
     v->done++;
     for (int i = 0; error != NULL && i < v->num_tasks; i++) {
         const json_t *other = v->task[i].result;
-        if (other != t->result &&
+        if (v->task[i].told &&
             json_equal(json_object_get(other, "error"), json_object_get(t->result, "error")))
             error = "not judged, for the reason above";
     }
+    t->told = true;
+    pthread_mutex_unlock(&v->lock);
     if (t->a != NULL)
         snprintf(line, sizeof line, "%s against %s: %s", t->a->name, t->ref.engine,
                  error != NULL ? error : verdict);

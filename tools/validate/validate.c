@@ -2,6 +2,7 @@
 
 #include "reference/import_check/import_check.h"
 #include "renderer/base/fs.h"
+#include "renderer/base/parallel.h"
 #include "renderer/base/progress.h"
 #include "tools/results/claim_result.h"
 #include "tools/results/results.h"
@@ -63,7 +64,7 @@ static struct claim_run *choose(const struct validation *v)
     return best;
 }
 
-static void tell_round(const struct validation *v, const struct claim_run *t)
+static void tell_round(struct validation *v, const struct claim_run *t)
 {
     char note[160];
     if (t->a == NULL || v->sequence == &alpha_spending_single)
@@ -113,11 +114,57 @@ static bool show_so_far(struct validation *v, const json_t *root, struct err *e)
     return ok;
 }
 
+static const struct suite_scene *root_of(const struct validation *v, const struct claim_run *t)
+{
+    return suite_find(&v->suite, t->scene->references_of);
+}
+
+/* Scene by scene, with those that have the same references, until each has been begun by some thread. */
+static void take_scenes(void *ctx, size_t first, size_t last)
+{
+    struct validation *v = ctx;
+    const struct suite_scene *root;
+    (void)first;
+    (void)last;
+    do {
+        root = NULL;
+        pthread_mutex_lock(&v->lock);
+        for (int i = 0; i < v->num_tasks; i++) {
+            struct claim_run *t = &v->task[i];
+            if (root == NULL && !t->begun)
+                root = root_of(v, t);
+            t->begun = t->begun || root_of(v, t) == root;
+        }
+        pthread_mutex_unlock(&v->lock);
+        for (int i = 0; root != NULL && i < v->num_tasks; i++)
+            if (root_of(v, &v->task[i]) == root)
+                claim_run_look(v, &v->task[i]);
+    } while (root != NULL);
+}
+
+/* Scenes side by side where the order is free and only our program runs, with parts of the threads: it starts, and files are
+ * written, by one thread. */
+static void take_side_by_side(struct validation *v)
+{
+    enum { MOST = 8 };
+    const struct validate_options *all = v->opt;
+    struct validate_options part = *all;
+    const int crew = all->threads < MOST ? all->threads : MOST;
+    if (v->sequence != &alpha_spending_single || all->live || all->engine != NULL ||
+        all->show_every_s > 0 || crew < 2)
+        return;
+    part.threads = all->threads / crew;
+    v->opt = &part;
+    parallel_for(crew, (size_t)crew, take_scenes, v);
+    v->opt = all;
+}
+
 /* Until all is decided, or the time is over, or, for --until-different, one differs: what was not looked
  * at by then stays without a result. */
 static bool take_looks(struct validation *v, const json_t *root, struct err *e)
 {
     bool found = false, ok = true;
+    take_side_by_side(v);
     for (struct claim_run *t;
          ok && !found && (t = choose(v)) != NULL && validate_time_left(v) > 0;) {
         tell_round(v, t);
@@ -247,8 +294,11 @@ static void describe(const struct validation *v, json_t *cannot, json_t *root)
 bool validate(const struct validate_options *opt, int argc, char **argv, json_t **results,
               struct err *e)
 {
-    struct validation v = {
-        .opt = opt, .start = now_seconds(), .shown = now_seconds(), .sequence = sequence_of(opt)};
+    struct validation v = {.opt = opt,
+                           .start = now_seconds(),
+                           .shown = now_seconds(),
+                           .sequence = sequence_of(opt),
+                           .lock = PTHREAD_MUTEX_INITIALIZER};
     json_t *root = NULL, *cannot = json_array();
     v.deadline = opt->budget_s > 0 ? v.start + opt->budget_s : INFINITY;
     v.stages = stages_of(opt);

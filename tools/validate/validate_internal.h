@@ -8,6 +8,8 @@
 #include "tools/sequential/alpha_spending.h"
 #include "validate.h"
 
+#include <pthread.h>
+
 enum { MAX_PATH = 8192, NUM_STAGES = 2, CLAIM_NAME = 256 };
 /* Of a scene: each reference against ours and the closed form and the further engine, that against ours, variants,
  * consistency, noise. */
@@ -65,6 +67,8 @@ struct claim_run {
     int stages;   /* 1 or 2 */
     int next;     /* look; NUM_LOOKS: none is left */
     bool stalled; /* what is left of the budget is too short for it */
+    bool begun;   /* by one of the threads that take scenes */
+    bool told;    /* the result is there for all threads to read */
     /* What the last look saw: the images of a and b, NULL before the first. */
     struct side_image *seen[2];
     int look, stage;
@@ -79,6 +83,7 @@ struct validation {
     struct suite suite;
     struct scene_sides *sides; /* per scene */
     struct claim_run *task;
+    pthread_mutex_t lock; /* of done, begun, told and the lines of progress */
     int num_tasks, done;
     json_t *
         left_out; /* {reference: in how many scenes it cannot be had with the engine's filter}; NULL: that is the box of one pixel */
@@ -90,7 +95,7 @@ struct validation {
 };
 
 /* A line of progress. */
-void validate_log(const struct validation *v, const char *scene, const char *what);
+void validate_log(struct validation *v, const char *scene, const char *what);
 /* Wall time that is left, INFINITY without a budget. */
 double validate_time_left(const struct validation *v);
 

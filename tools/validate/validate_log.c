@@ -10,13 +10,15 @@ double validate_time_left(const struct validation *v)
     return v->deadline - now_seconds();
 }
 
-void validate_log(const struct validation *v, const char *scene, const char *what)
+void validate_log(struct validation *v, const char *scene, const char *what)
 {
     if (v->opt->quiet)
         return;
+    pthread_mutex_lock(&v->lock);
     fprintf(stderr, "[%2d/%d", v->done, v->num_tasks);
     if (isfinite(v->deadline))
         fprintf(stderr, ", %.0f s of %.0f s left", fmax(0, validate_time_left(v)),
                 v->opt->budget_s);
     fprintf(stderr, "] %s: %s\n", scene, what);
+    pthread_mutex_unlock(&v->lock);
 }
