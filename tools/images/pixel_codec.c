@@ -4,9 +4,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include <zlib.h>
+#include <libdeflate.h>
 
-enum { OFFSET = 4096, STEPS = 12, LARGEST = 1 << 20 };
+enum { LEVEL = 6, OFFSET = 4096, STEPS = 12, LARGEST = 1 << 20 };
 
 static const double octave[STEPS] = {4096, 4340, 4598, 4871, 5161, 5468,
                                      5793, 6137, 6502, 6889, 7298, 7732};
@@ -152,14 +152,13 @@ static void encode_counts(struct coder *c)
 
 static bool pack(const uint8_t *raw, size_t length, uint8_t **bytes, size_t *size, struct err *e)
 {
-    uLongf packed = compressBound((uLong)length);
-    *bytes = malloc(packed);
-    if (*bytes == NULL || compress2(*bytes, &packed, raw, (uLong)length, 9) != Z_OK) {
-        free(*bytes);
-        return err_set(e, "out of memory for the report");
-    }
-    *size = packed;
-    return true;
+    struct libdeflate_compressor *c = libdeflate_alloc_compressor(LEVEL);
+    const size_t room = c != NULL ? libdeflate_zlib_compress_bound(c, length) : 0;
+    *bytes = c != NULL ? malloc(room) : NULL;
+    if (*bytes != NULL)
+        *size = libdeflate_zlib_compress(c, raw, length, *bytes, room);
+    libdeflate_free_compressor(c);
+    return *bytes != NULL || err_set(e, "out of memory for the report");
 }
 
 /* The planes of c with one predictor, compressed. */
