@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <gsl/gsl_math.h>
 #include <gsl/gsl_sort.h>
 
 double truth_fresnel(double cos_i, double n, double *cos_t)
@@ -23,7 +24,7 @@ double truth_fresnel(double cos_i, double n, double *cos_t)
  * (1 - F)^2 F^j, or 0 if that is more than `depth` bounces. */
 static double glass_weight(double f, int j, int depth)
 {
-    return j + 2 <= depth ? (1 - f) * (1 - f) * pow(f, j) : 0;
+    return j + 2 <= depth ? (1 - f) * (1 - f) * gsl_pow_int(f, j) : 0;
 }
 
 static bool unpack_range(const char *name, const double v[2], struct err *e)
@@ -264,14 +265,20 @@ int truth_glass_sphere_radiance(const void *sphere, const double eye[3], const d
     /* The ray leaves after j internal reflections at the polar angle (j + 1)(pi - 2 theta_t) from the
      * point of entry, counted towards `along`, and there under theta_i to the normal, on the side it
      * turns to. j = -1 is the reflection at the point of entry. */
-    double theta_i = atan2(sin_i, cos_i), theta_t = asin(sin_i / s->n);
+    double sin_t = sin_i / s->n, cos_t = sqrt(1 - sin_t * sin_t);
+    double turn[2] = {2 * sin_t * sin_t - 1, 2 * sin_t * cos_t}; /* cosine and sine */
+    double polar[2] = {1, 0};
     int id = 6;
     for (int j = -1; j + 2 <= s->depth; j++) {
-        double polar = (j + 1) * (M_PI - 2 * theta_t), out = polar + theta_i, p[3], w[3];
+        double out[2] = {polar[0] * cos_i - polar[1] * sin_i, polar[1] * cos_i + polar[0] * sin_i};
+        double p[3], w[3];
         for (int k = 0; k < 3; k++) {
-            p[k] = s->centre[k] + s->radius * (cos(polar) * normal[k] + sin(polar) * along[k]);
-            w[k] = cos(out) * normal[k] + sin(out) * along[k];
+            p[k] = s->centre[k] + s->radius * (polar[0] * normal[k] + polar[1] * along[k]);
+            w[k] = out[0] * normal[k] + out[1] * along[k];
         }
+        double next = polar[0] * turn[0] - polar[1] * turn[1];
+        polar[1] = polar[1] * turn[0] + polar[0] * turn[1];
+        polar[0] = next;
         double weight = j < 0 ? f : glass_weight(f, j, s->depth);
         id = 6 * id + add_wall(s, p, w, weight, light);
     }
