@@ -16,7 +16,7 @@
 
 enum {
     NOISE_RUNGS = 4,
-    NOISE_REPLICATES = 8,         /* of a run; half as many where these decide, twice as many where they do not */
+    NOISE_REPLICATES = 8,         /* of a run: half as many first, twice as many at most */
     NOISE_RECORD_REPLICATES = 24, /* of a record of ours */
     NOISE_TOP = 64                /* samples of the last rung of ours */
 };
