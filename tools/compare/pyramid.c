@@ -10,7 +10,6 @@
 
 enum { SMALLEST_BAND = 32 }; /* rows */
 const double float_tolerance = 1e-5;
-const double luminance_weight[3] = {0.2126, 0.7152, 0.0722};
 
 /* Estimates in neighbouring pixels of one side: arrays that stay in the first cache, for vectors. */
 enum { RUN = 64 };

@@ -7,11 +7,11 @@
 #define ASSAY_PYRAMID_H
 
 #include "renderer/image/moments.h"
+#include "tools/images/luminance.h"
 
 enum { CHANNEL_LUMINANCE = 3, NUM_CHANNELS = 4 };
 /* Relative: what two engines' float32 arithmetic may make of the same value. */
 extern const double float_tolerance;
-extern const double luminance_weight[3]; /* Rec. 709: .2126 .7152 .0722 */
 
 /* One side's mean in one pixel (or the sum of such means over a region), as an estimate. */
 struct estimate {

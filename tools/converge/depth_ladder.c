@@ -1,7 +1,7 @@
 #include "depth_ladder.h"
 
 #include "reference/truth/truth.h"
-#include "tools/html/plot_colour.h"
+#include "tools/images/luminance.h"
 
 #include <math.h>
 

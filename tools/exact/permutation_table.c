@@ -8,9 +8,6 @@ enum { MOST_REGIONS = 1024 };
 void permutation_table_free(struct permutation_table *t)
 {
     free(t->z);
-    free(t->mean[0]);
-    free(t->mean[1]);
-    free(t->spread);
     free(t->rect);
     free(t->channel);
     *t = (struct permutation_table){0};
@@ -58,14 +55,15 @@ static bool table_alloc(struct permutation_table *t, size_t num, struct err *e)
     size_t rows = (size_t)t->num_a + (size_t)t->num_b;
     t->num = num;
     /* NOLINTNEXTLINE(clang-analyzer-optin.portability.UnixAPI): there are rows and regions. */
-    t->z = malloc(rows * num * sizeof *t->z);
-    t->mean[0] = calloc(num, sizeof *t->mean[0]);
-    t->mean[1] = calloc(num, sizeof *t->mean[1]);
-    t->spread = calloc(num, sizeof *t->spread);
+    t->z = calloc((rows + 3) * num, sizeof *t->z);
     t->rect = malloc(num * sizeof *t->rect);
     t->channel = malloc(num * sizeof *t->channel);
-    return (t->z && t->mean[0] && t->mean[1] && t->spread && t->rect && t->channel) ||
-           err_set(e, "out of memory for %zu regions of %zu images", num, rows);
+    if (t->z == NULL || t->rect == NULL || t->channel == NULL)
+        return err_set(e, "out of memory for %zu regions of %zu images", num, rows);
+    t->mean[0] = t->z + rows * num;
+    t->mean[1] = t->mean[0] + num;
+    t->spread = t->mean[1] + num;
+    return true;
 }
 
 static void standardise(struct permutation_table *t, size_t r)

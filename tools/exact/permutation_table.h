@@ -12,7 +12,7 @@ struct permutation_table {
     double sign;     /* 0: of |sum|; else of sum times sign, one-sided */
     double *z;       /* num_a + num_b rows of num: centred, sum of squares 1, or all 0 */
     double *mean[2]; /* of A's and B's rows, before that */
-    double *spread;  /* root of the total sum of squares, before that */
+    double *spread;  /* root of the total sum of squares, before that; all in the memory of z */
     struct rect *rect;
     int *channel;
 };

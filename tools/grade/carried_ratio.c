@@ -15,8 +15,7 @@ static double brightness(const struct rubric *r, const double *mean, int width, 
     double sum = 0, num = 0;
     for (size_t p = 0; p < (size_t)width * (size_t)height; p++)
         if (use[p] && !rubric_masks(r, width, height, p)) {
-            for (size_t c = 0; c < 3; c++)
-                sum += luminance_weight[c] * mean[3 * p + c];
+            sum += luminance(mean + 3 * p);
             num++;
         }
     return num > 0 ? sum / num : 0;

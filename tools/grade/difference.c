@@ -205,9 +205,7 @@ struct sums {
 
 static double weighted(const double *x, int channel)
 {
-    return channel < CHANNEL_LUMINANCE ? x[channel]
-                                       : luminance_weight[0] * x[0] + luminance_weight[1] * x[1] +
-                                             luminance_weight[2] * x[2];
+    return channel < CHANNEL_LUMINANCE ? x[channel] : luminance(x);
 }
 
 /* For any correlation of the channels (pyramid.h). */

@@ -194,8 +194,8 @@ static void light_of(const struct submitted_image *s, const struct moments *m, d
             int x = t % columns * RUBRIC_TILE + i % RUBRIC_TILE,
                 y = t / columns * RUBRIC_TILE + i / RUBRIC_TILE;
             size_t p = 3 * ((size_t)y * (size_t)s->width + (size_t)x);
-            a += fmin(submitted_image_luminance(s->mean + p), s->clip);
-            b += fmin(submitted_image_luminance(m->mean + p), s->clip);
+            a += fmin(luminance(s->mean + p), s->clip);
+            b += fmin(luminance(m->mean + p), s->clip);
         }
         light[t] = a > 0 && b > 0 ? a / b : 1;
     }

@@ -1,7 +1,7 @@
 #include "submitted_image.h"
 
 #include "renderer/base/sha256.h"
-#include "tools/compare/pyramid.h"
+#include "tools/images/luminance.h"
 #include "tools/images/tone_curve.h"
 #include "tools/images/image_file.h"
 #include "tools/submission/rubric.h"
@@ -149,11 +149,6 @@ static int neighbours(const struct submitted_image *s, size_t p, size_t at[9])
     return num;
 }
 
-double submitted_image_luminance(const double px[3])
-{
-    return luminance_weight[0] * px[0] + luminance_weight[1] * px[1] + luminance_weight[2] * px[2];
-}
-
 /* From the scatter of the runs around their weighted mean: sum of w (x - mean)^2 over (runs - 1). */
 static void measure_runs(struct submitted_image *s)
 {
@@ -166,8 +161,7 @@ static void measure_runs(struct submitted_image *s)
             double w = s->run[k].spp / s->spp / s->runs_dof;
             for (size_t c = 0; c < 3; c++)
                 s->measured[4 * p + c] += w * pow(x[c] - mean[c], 2);
-            s->measured[4 * p + 3] +=
-                w * pow(submitted_image_luminance(x) - submitted_image_luminance(mean), 2);
+            s->measured[4 * p + 3] += w * pow(luminance(x) - luminance(mean), 2);
         }
 }
 

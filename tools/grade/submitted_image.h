@@ -33,8 +33,6 @@ NODISCARD bool submitted_image_read(const char *path, const char *curve, int wid
                                     struct submitted_image *out, struct err *e);
 void submitted_image_free(struct submitted_image *s);
 
-double submitted_image_luminance(const double px[3]);
-
 /* Makes s the mean of its runs and of one more, weighted by their samples (spp of both is set), and takes that over. A run
  * of less than a third of the samples of the largest is kept, but no part of the mean: it says little, and its noise is
  * cut off at the clipping point sooner. Fails, and leaves *more to the caller, where memory is short. */

@@ -7,11 +7,6 @@
 
 #include <gsl/gsl_sort.h>
 
-double luminance(const double rgb[3])
-{
-    return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
-}
-
 /* The smallest of n > 0 values that at least that fraction of them, in (0, 1], do not exceed. Sorts
  * them. */
 static double percentile(double *value, size_t n, double fraction)

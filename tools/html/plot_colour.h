@@ -7,9 +7,6 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Rec. 709 luminance of a linear RGB triple. */
-double luminance(const double rgb[3]);
-
 /* The radiance that is shown as white: the 99th percentile of the n luminances is shown at 0.8 of
  * white. Where a lamp fills so much of the image that this would leave all else black (it is over
  * 6 times the median of the positive luminances), 6 times that median takes its place and *capped is

@@ -109,9 +109,9 @@ struct flip {
     struct kernel csf[NUM_CHANNELS][MAX_TERMS]; /* along one axis; no weights where the term is 0 */
     float share[NUM_CHANNELS][MAX_TERMS];
     struct kernel feature[3]; /* by order */
-    float *rgb[2];            /* 3 a pixel; after filtering, Hunt-adjusted Lab */
-    float *edge[2], *point[2];
-    float *plane, *line, *out, *sum; /* `line`: a row and its continuation on both sides */
+    float *line;              /* a row and its continuation on both sides; the rest lies after it */
+    float *rgb[2], *plane;    /* 3 a pixel; rgb: after filtering, Hunt-adjusted Lab */
+    float *edge[2], *point[2], *out, *sum;
 };
 
 static void flip_free(struct flip *f)
@@ -121,15 +121,7 @@ static void flip_free(struct flip *f)
             free(f->csf[c][t].weight);
     for (int i = 0; i < 3; i++)
         free(f->feature[i].weight);
-    for (int i = 0; i < 2; i++) {
-        free(f->rgb[i]);
-        free(f->edge[i]);
-        free(f->point[i]);
-    }
-    free(f->plane);
     free(f->line);
-    free(f->out);
-    free(f->sum);
 }
 
 static bool make_csf_kernels(struct flip *f, double ppd)
@@ -162,20 +154,21 @@ static bool flip_start(struct flip *f, int width, int height, double ppd, struct
         ok = make_feature_kernel(i, ppd, &f->feature[i]);
         widest = f->feature[i].radius > widest ? f->feature[i].radius : widest;
     }
-    for (int i = 0; i < 2; i++) {
-        f->rgb[i] = malloc(3 * pixels * sizeof(float));
-        f->edge[i] = malloc(pixels * sizeof(float));
-        f->point[i] = malloc(pixels * sizeof(float));
-        ok = ok && f->rgb[i] != NULL && f->edge[i] != NULL && f->point[i] != NULL;
-    }
-    f->plane = malloc(3 * pixels * sizeof(float));
-    f->line = malloc(((size_t)width + 2 * (size_t)widest) * sizeof(float));
-    f->out = malloc(pixels * sizeof(float));
-    f->sum = malloc(pixels * sizeof(float));
-    ok = ok && f->plane != NULL && f->line != NULL && f->out != NULL && f->sum != NULL;
-    if (!ok)
+    const size_t length = (size_t)width + 2 * (size_t)widest;
+    f->line = ok ? malloc((length + 15 * pixels) * sizeof *f->line) : NULL;
+    if (f->line == NULL) {
         flip_free(f);
-    return ok || err_set(e, "out of memory for FLIP");
+        return err_set(e, "out of memory for FLIP");
+    }
+    f->plane = f->line + length;
+    f->out = f->plane + 3 * pixels;
+    f->sum = f->out + pixels;
+    for (int i = 0; i < 2; i++) {
+        f->rgb[i] = f->sum + pixels + (size_t)i * 5 * pixels;
+        f->edge[i] = f->rgb[i] + 3 * pixels;
+        f->point[i] = f->edge[i] + pixels;
+    }
+    return true;
 }
 
 static void filter_rows(struct flip *f, const struct kernel *k, const float *in, float *out)

@@ -1,5 +1,7 @@
 #include "flip.h"
 
+#include "luminance.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -30,8 +32,7 @@ bool flip_exposures(const double *reference, size_t pixels, struct flip_exposure
     if (y == NULL)
         return err_set(e, "out of memory for FLIP");
     for (size_t i = 0; i < pixels; i++)
-        y[i] = fmax(0, 0.2126 * reference[3 * i] + 0.7152 * reference[3 * i + 1] +
-                           0.0722 * reference[3 * i + 2]);
+        y[i] = fmax(0, luminance(reference + 3 * i));
     gsl_sort(y, 1, pixels);
     double brightest = y[pixels - 1], median = (y[(pixels - 1) / 2] + y[pixels / 2]) / 2;
     if (brightest > 0 && !(y[(pixels - 1) / 2] > 0)) {

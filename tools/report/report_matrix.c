@@ -5,6 +5,7 @@
 #include "renderer/image/tone.h"
 #include "tools/html/html.h"
 #include "tools/html/plot_colour.h"
+#include "tools/images/luminance.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -2,6 +2,7 @@
 
 #include "renderer/base/fs.h"
 #include "tools/html/plot_colour.h"
+#include "tools/images/luminance.h"
 #include "tools/html/html.h"
 #include "reference/suite/engine_table.h"
 

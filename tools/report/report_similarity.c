@@ -1,6 +1,6 @@
 #include "report_internal.h"
 
-#include "tools/html/plot_colour.h"
+#include "tools/images/luminance.h"
 #include "tools/images/idiff.h"
 #include "tools/images/pixel_codec.h"
 #include "tools/html/csv_link.h"
