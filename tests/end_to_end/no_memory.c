@@ -394,6 +394,7 @@ static void run_here(long at, int argc, char **argv, char **env)
     close(out);
     close(err);
     unsetenv("NO_MEMORY");
+    unsetenv("LD_BIND_NOW");
     alarm(SECONDS);
     fail_at = at;
     armed = true;
@@ -470,10 +471,10 @@ static bool is_chosen(long i, long num, const uint64_t *done, size_t num_done)
     for (size_t k = 0; k < num_done; k++)
         if (done[k] == hash)
             return false;
-    for (long k = 0; k < i; k++)
-        first &= shared->seen[k] != hash;
-    for (long k = i + 1; k < num; k++)
-        last &= shared->seen[k] != hash;
+    for (long k = 0; k < i && first; k++)
+        first = shared->seen[k] != hash;
+    for (long k = num - 1; k > i && last && !first; k--)
+        last = shared->seen[k] != hash;
     return first || last;
 }
 
