@@ -40,6 +40,9 @@ SANITIZE := -O1 -g1 -fno-omit-frame-pointer -fno-sanitize-recover=all -fsanitize
 # The same under sanitizers; all of it by clang, to see that it has no warning there too, and for the fuzzers; on demand
 # under ThreadSanitizer, and with clang's counts of what ran.
 $(BUILD)/san/%: OPT := $(SANITIZE)
+# Where tests spend most of their time it pays to compile longer.
+BUSY := renderer/bvh/bvh tools/compare/hint tools/diagnose/bug_fit tools/diagnose/signature tools/exact/permutation tools/grade/difference tools/images/flip
+$(BUSY:%=$(BUILD)/san/%.c.o): OPT = $(SANITIZE:-O1=-O2)
 $(BUILD)/san/%: WERROR := 1
 $(BUILD)/tests/%: WERROR := 1
 $(BUILD)/clang/%: CC := clang

@@ -121,6 +121,19 @@ fi
 # The guide: indented lines, but what programs print.
 cd "$tmp/walk" || exit 1
 cp "$top/tests/end_to_end/tracer.py" .
+# What the same tracer.py has rendered with the same arguments is not rendered again.
+mkdir "$tmp/rendered"
+cat >"$tmp/usr/bin/python3" <<END
+#!/bin/bash
+[[ \$1 == */tracer.py ]] || exec /usr/bin/python3 "\$@"
+key=$tmp/rendered/\$(cat "\$1" "\$2" - <<<"\${*:2:5}" | md5sum | cut -c 1-32)
+if [ ! -f "\$key" ]; then
+    /usr/bin/python3 "\$@" || exit
+    cp "\$7" "\$key.\$\$" && mv "\$key.\$\$" "\$key"
+fi
+cp "\$key" "\$7"
+END
+chmod +x "$tmp/usr/bin/python3"
 echo '{"floor": [0.5, 0.5, 0.5], "lamp": {"height": 3, "size": 1, "radiance": 20}, "balls": [{"at": [0, 0.5, 0], "radius": 0.5, "albedo": [0.7, 0.3, 0.2]}]}' >ball.json
 echo '{"floor": [0.6, 0.6, 0.6], "lamp": {"height": 3, "size": 2, "radiance": 5}, "balls": [{"at": [-0.6, 0.5, 0], "radius": 0.5, "albedo": [0.2, 0.6, 0.3]}, {"at": [0.5, 0.4, 0.4], "radius": 0.4, "albedo": [0.8, 0.8, 0.8]}]}' >two.json
 guide() { sed -n 's/^    //p' "$top/tools/docs/guide-own-suite.md" | grep -v '^result:'; }

@@ -133,7 +133,10 @@ static bool run_labellings(const struct permutation_table *t, struct permutation
         for (*where = 0; *where + 1 < t->num && fabs(of[*where]) < *observed;)
             ++*where;
         uint64_t state = 1;
-        for (int i = 1; i < out->num_labellings; i++) {
+        /* In lexicographic order the second half has the complements of the first, whose sums are the same with the other sign. */
+        const bool is_mirrored = out->is_exhaustive && t->sign == 0 && t->num_a == t->num_b;
+        const int num = is_mirrored ? out->num_labellings / 2 : out->num_labellings;
+        for (int i = 1; i < num; i++) {
             int first = 0;
             if (out->is_exhaustive)
                 first = next_subset(row, t->num_a, rows);
@@ -142,6 +145,8 @@ static bool run_labellings(const struct permutation_table *t, struct permutation
             assert(first >= 0);
             (*largest)[i] = largest_sum(t, row, first, sum);
         }
+        if (is_mirrored)
+            memcpy(*largest + num, *largest, (size_t)num * sizeof **largest);
         gsl_sort(*largest, 1, (size_t)out->num_labellings);
     } else {
         err_set(e, "out of memory for %d labellings", out->num_labellings);
