@@ -101,11 +101,15 @@ INLINE vf microfacet_slope_integral(vf x, vf t, vf e)
 }
 
 /* The slope s at which the integral of (1 - s t) exp(-s^2) is the fraction u of what a viewer at tan(theta) = t sees
- * of all slopes; t = 0 gives a normal variate of variance 1/2. Newton's method inside a shrinking bracket; `lanes` are wanted. */
+ * of all slopes; t = 0 gives a normal variate of variance 1/2. Newton's method inside a shrinking bracket; `lanes` are wanted. A step of
+ * 2e-4 is the last: the next would be of its square, which rounding does not let be seen. u is met to 4e-7. */
 INLINE vf microfacet_slope(unsigned lanes, vf t, vf u)
 {
-    const vf zero = vf_set(0), accuracy = vf_set(1e-6f), top = vf_set(6);
-    vf lo = -top, hi = vf_select(vf_lt(1 / top, t), 1 / t, top), x = zero;
+    const vf zero = vf_set(0), top = vf_set(6);
+    vf lo = -top, hi = vf_select(vf_lt(1 / top, t), 1 / t, top), y = 2 * u - 1;
+    /* About there: the inverse error function's series, less what a slant takes. */
+    vf x = 0.8862f * y * (1 + 0.26f * y * y) - (1 - 1 / (t + 1)) * (0.7f + 0.45f * u);
+    x = vf_min(x, 0.9f * hi);
     vf all = microfacet_slope_integral(hi, t, exp_negative(-hi * hi));
     for (int i = 0; i < 30 && lanes; i++) {
         const vi live = lanes_of(lanes);
@@ -114,8 +118,9 @@ INLINE vf microfacet_slope(unsigned lanes, vf t, vf u)
         hi = vf_select(above & live, x, hi);
         lo = vf_select(~above & live, x, lo);
         vf next = x - f / ((1 - x * t) * e);
-        next = vf_select(vf_lt(lo, next) & vf_lt(next, hi), next, 0.5f * (lo + hi));
-        lanes &= ~bits(vf_lt(vf_abs(next - x), accuracy) | vf_lt(hi - lo, accuracy));
+        vi last = vf_lt(vf_abs(next - x), vf_set(2e-4f));
+        next = vf_select(last | (vf_lt(lo, next) & vf_lt(next, hi)), next, 0.5f * (lo + hi));
+        lanes &= ~bits(last | vf_lt(hi - lo, vf_set(1e-6f)));
         x = vf_select(live, next, x);
     }
     return x;
