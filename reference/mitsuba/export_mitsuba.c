@@ -90,15 +90,19 @@ static bool put_index(struct writer *w, const char *name, uint32_t material, rgb
     return ok;
 }
 
-static bool put_rough_metal(struct writer *w, uint32_t index, struct err *e)
+/* Rough, or a mirror. */
+static bool put_metal(struct writer *w, uint32_t index, struct err *e)
 {
     const struct material *m = &w->s->materials[index];
-    mitsuba_begin(w->xml, "bsdf", "roughconductor", NULL, NULL);
-    mitsuba_text(w->xml, "string", "distribution",
-                 m->microfacet == MICROFACET_GGX ? "ggx" : "beckmann");
-    mitsuba_real(w->xml, "float", "alpha", (double)m->alpha);
+    const bool rough = m->kind == MATERIAL_MICROFACET;
     bool ok = true;
-    if (m->conductor) {
+    mitsuba_begin(w->xml, "bsdf", rough ? "roughconductor" : "conductor", NULL, NULL);
+    if (rough) {
+        mitsuba_text(w->xml, "string", "distribution",
+                     m->microfacet == MICROFACET_GGX ? "ggx" : "beckmann");
+        mitsuba_real(w->xml, "float", "alpha", (double)m->alpha);
+    }
+    if (rough && m->conductor) {
         ok = put_index(w, "eta", index, m->eta, e) && put_index(w, "k", index, m->k, e);
     } else {
         mitsuba_text(w->xml, "string", "material", "none");
@@ -108,48 +112,10 @@ static bool put_rough_metal(struct writer *w, uint32_t index, struct err *e)
     return ok;
 }
 
-static bool put_diffuse(struct writer *w, uint32_t index, struct err *e)
-{
-    (void)e;
-    mitsuba_begin(w->xml, "bsdf", "diffuse", NULL, NULL);
-    mitsuba_rgb(w->xml, "reflectance", w->s->materials[index].reflectance);
-    mitsuba_end(w->xml);
-    return true;
-}
-
-static bool put_mirror(struct writer *w, uint32_t index, struct err *e)
-{
-    (void)e;
-    mitsuba_begin(w->xml, "bsdf", "conductor", NULL, NULL);
-    mitsuba_text(w->xml, "string", "material", "none");
-    mitsuba_rgb(w->xml, "specular_reflectance", w->s->materials[index].reflectance);
-    mitsuba_end(w->xml);
-    return true;
-}
-
-static bool put_glass(struct writer *w, uint32_t index, struct err *e)
-{
-    const struct material *m = &w->s->materials[index];
-    (void)e;
-    mitsuba_real(w->xml, "float", "int_ior", (double)m->ior);
-    mitsuba_real(w->xml, "float", "ext_ior", 1);
-    mitsuba_rgb(w->xml, "specular_reflectance", m->reflectance);
-    mitsuba_rgb(w->xml, "specular_transmittance", m->transmittance);
-    return true;
-}
-
-/* NULL: Mitsuba does not have it. */
-static bool (*const put_bsdf[NUM_MATERIAL_KINDS])(struct writer *w, uint32_t index,
-                                                  struct err *e) = {
-    [MATERIAL_DIFFUSE] = put_diffuse,
-    [MATERIAL_MIRROR] = put_mirror,
-    [MATERIAL_GLASS] = put_glass,
-    [MATERIAL_MICROFACET] = put_rough_metal};
-
 static bool check_material(const struct material *m, struct err *e)
 {
     const char *why = NULL;
-    if (put_bsdf[m->kind] == NULL)
+    if (m->kind == MATERIAL_REFRACTION || m->kind == MATERIAL_PLASTIC)
         why = features_material_names[m->kind];
     else if (m->kind == MATERIAL_GLASS && m->schlick)
         why = "Schlick's approximation";
@@ -168,7 +134,19 @@ static bool put_material(struct writer *w, uint32_t index, struct err *e)
         return false;
     snprintf(id, sizeof id, "material_%u", index);
     mitsuba_begin(w->xml, "bsdf", m->kind == MATERIAL_GLASS ? "dielectric" : "twosided", "id", id);
-    bool ok = put_bsdf[m->kind](w, index, e);
+    bool ok = true;
+    if (m->kind == MATERIAL_GLASS) {
+        mitsuba_real(w->xml, "float", "int_ior", (double)m->ior);
+        mitsuba_real(w->xml, "float", "ext_ior", 1);
+        mitsuba_rgb(w->xml, "specular_reflectance", m->reflectance);
+        mitsuba_rgb(w->xml, "specular_transmittance", m->transmittance);
+    } else if (m->kind == MATERIAL_DIFFUSE) {
+        mitsuba_begin(w->xml, "bsdf", "diffuse", NULL, NULL);
+        mitsuba_rgb(w->xml, "reflectance", m->reflectance);
+        mitsuba_end(w->xml);
+    } else {
+        ok = put_metal(w, index, e);
+    }
     mitsuba_end(w->xml);
     return ok;
 }
@@ -220,9 +198,7 @@ static bool put_object(struct writer *w, uint32_t index, struct err *e)
     const struct object *o = &w->s->objects[index];
     const struct material *m = &w->s->materials[o->material];
     char ending[32];
-    bool smooth = false;
-    for (uint32_t i = o->first_triangle; i < o->first_triangle + o->num_triangles; i++)
-        smooth = smooth || !features_triangle_is_flat(w->s, i);
+    bool smooth = features_are_smooth(w->s, o->first_triangle, o->num_triangles);
     /* The side that glows is the geometric normal's for us, the shading normal's for Mitsuba. */
     if (smooth && !rgb_is_zero(m->radiance)) {
         smooth = false;
@@ -282,8 +258,6 @@ static bool put_sky_image(struct writer *w, int width, int height, struct err *e
 static bool put_sky(struct writer *w, struct err *e)
 {
     struct environment_parts sky = environment_parts(w->s->environment);
-    if (environment_is_hidden(w->s->environment))
-        return err_set(e, "Mitsuba has no ambient light that only rough surfaces receive");
     if (sky.kind == ENVIRONMENT_IMAGE)
         return put_sky_image(w, (int)sky.width, (int)sky.height, e);
     mitsuba_begin(w->xml, "emitter", "constant", NULL, NULL);
@@ -295,28 +269,18 @@ static bool put_sky(struct writer *w, struct err *e)
 static bool put_light(struct writer *w, uint32_t index, struct err *e)
 {
     const struct light *l = &w->s->lights[index];
-    bool delta = l->kind == LIGHT_POINT || l->kind == LIGHT_SPOT;
-    const float *a = l->attenuation;
-    if (delta && (a[0] != 0 || a[1] != 0 || !(a[2] > 0)))
-        return err_set(
-            e, "Mitsuba: light %u: falloff 1/(%g + %g d + %g d^2) is not the inverse square", index,
-            (double)a[0], (double)a[1], (double)a[2]);
     switch (l->kind) {
     case LIGHT_POINT:
         mitsuba_begin(w->xml, "emitter", "point", NULL, NULL);
         mitsuba_point(w->xml, "point", "position", l->position);
-        mitsuba_rgb(w->xml, "intensity", rgb_scale(l->value, 1 / a[2]));
+        mitsuba_rgb(w->xml, "intensity", rgb_scale(l->value, 1 / l->attenuation[2]));
         mitsuba_end(w->xml);
         return true;
     case LIGHT_SPOT: {
-        if (l->exponent != 0)
-            return err_set(
-                e, "Mitsuba: light %u: no spot light that falls off as a power of the cosine",
-                index);
         double angle = acos((double)l->cos_cutoff) * 180 / M_PI;
         frame f = frame_from_normal(l->axis);
         mitsuba_begin(w->xml, "emitter", "spot", NULL, NULL);
-        mitsuba_rgb(w->xml, "intensity", rgb_scale(l->value, 1 / a[2]));
+        mitsuba_rgb(w->xml, "intensity", rgb_scale(l->value, 1 / l->attenuation[2]));
         mitsuba_real(w->xml, "float", "cutoff_angle", angle);
         mitsuba_real(w->xml, "float", "beam_width", angle);
         mitsuba_transform(w->xml, f.s, f.t, f.n, l->position);

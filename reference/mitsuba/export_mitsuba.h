@@ -9,8 +9,7 @@
  * and STEM_environment.exr as needed, STEM being path without its ending. Samples and seed are the
  * parameters $spp and $seed. Fails with one line on what Mitsuba cannot express: a boundary that only
  * refracts, Schlick's approximation, correlated shadowing, emission on both sides, smooth emitters
- * that reflect, a falloff that is not the inverse square, spot lights that are brighter in the
- * middle, the ambient light of the assignment, and what features_check_exportable() refuses. */
+ * that reflect, and what features_check_exportable() refuses. */
 NODISCARD bool export_mitsuba(const struct scene *s, const struct camera *c, int depth,
                               const char *path, struct err *e);
 

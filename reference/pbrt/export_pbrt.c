@@ -173,24 +173,20 @@ static bool put_material(const struct writer *w, uint32_t index, struct err *e)
     return true;
 }
 
+static void put_vertices(const struct writer *w, const struct object *o, const vec3 *v)
+{
+    v += 3 * (size_t)o->first_triangle;
+    for (size_t k = 0; k < 3 * (size_t)o->num_triangles; k++)
+        fprintf(w->f, "\n  %.9g %.9g %.9g", (double)v[k].x, (double)v[k].y, (double)v[k].z);
+}
+
 static void put_mesh(const struct writer *w, const struct object *o)
 {
-    bool smooth = false;
     fputs("Shape \"trianglemesh\" \"point3 P\" [", w->f);
-    for (uint32_t i = o->first_triangle; i < o->first_triangle + o->num_triangles; i++) {
-        smooth = smooth || !features_triangle_is_flat(w->s, i);
-        for (size_t k = 3 * (size_t)i; k < 3 * (size_t)i + 3; k++) {
-            vec3 p = w->s->position[k];
-            fprintf(w->f, "\n  %.9g %.9g %.9g", (double)p.x, (double)p.y, (double)p.z);
-        }
-    }
-    if (smooth) {
+    put_vertices(w, o, w->s->position);
+    if (features_are_smooth(w->s, o->first_triangle, o->num_triangles)) {
         fputs("]\n \"normal N\" [", w->f);
-        for (size_t k = 3 * (size_t)o->first_triangle;
-             k < 3 * ((size_t)o->first_triangle + o->num_triangles); k++) {
-            vec3 n = w->s->normal[k];
-            fprintf(w->f, "\n  %.9g %.9g %.9g", (double)n.x, (double)n.y, (double)n.z);
-        }
+        put_vertices(w, o, w->s->normal);
     }
     fputs("]\n \"integer indices\" [", w->f);
     for (uint32_t i = 0; i < 3 * o->num_triangles; i++)
@@ -271,8 +267,6 @@ static bool put_sky_image(const struct writer *w, uint32_t rows, struct err *e)
 static bool put_sky(const struct writer *w, struct err *e)
 {
     struct environment_parts sky = environment_parts(w->s->environment);
-    if (environment_is_hidden(w->s->environment))
-        return err_set(e, "pbrt has no ambient light that only rough surfaces receive");
     if (sky.kind == ENVIRONMENT_IMAGE)
         return put_sky_image(w, sky.height, e);
     fputs("LightSource \"infinite\"", w->f);
@@ -284,24 +278,15 @@ static bool put_sky(const struct writer *w, struct err *e)
 static bool put_light(const struct writer *w, uint32_t index, struct err *e)
 {
     const struct light *l = &w->s->lights[index];
-    const float *a = l->attenuation;
-    if ((l->kind == LIGHT_POINT || l->kind == LIGHT_SPOT) &&
-        (a[0] != 0 || a[1] != 0 || !(a[2] > 0)))
-        return err_set(e,
-                       "pbrt: light %u: falloff 1/(%g + %g d + %g d^2) is not the inverse square",
-                       index, (double)a[0], (double)a[1], (double)a[2]);
     switch (l->kind) {
     case LIGHT_POINT:
         fputs("LightSource \"point\"", w->f);
-        put_rgb(w, "I", rgb_scale(l->value, 1 / a[2]));
+        put_rgb(w, "I", rgb_scale(l->value, 1 / l->attenuation[2]));
         put_point(w, "from", l->position);
         break;
     case LIGHT_SPOT:
-        if (l->exponent != 0)
-            return err_set(
-                e, "pbrt: light %u: no spot light that falls off as a power of the cosine", index);
         fputs("LightSource \"spot\"", w->f);
-        put_rgb(w, "I", rgb_scale(l->value, 1 / a[2]));
+        put_rgb(w, "I", rgb_scale(l->value, 1 / l->attenuation[2]));
         put_point(w, "from", l->position);
         put_point(w, "to", add(l->position, l->axis));
         fprintf(w->f, " \"float coneangle\" [%.9g] \"float conedeltaangle\" [0]",

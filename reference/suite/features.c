@@ -1,6 +1,7 @@
 #include "features.h"
 
 #include "renderer/math/mat4.h"
+#include "renderer/scene/environment.h"
 
 #include <math.h>
 
@@ -41,13 +42,21 @@ static dvec3 unit_normal(const vec3 *p)
     return d3_scale(n, 1 / d3_length(n));
 }
 
-bool features_triangle_is_flat(const struct scene *s, uint32_t triangle)
+static bool is_flat(const struct scene *s, uint32_t triangle)
 {
     dvec3 n = unit_normal(s->position + 3 * (size_t)triangle);
     for (size_t k = 3 * (size_t)triangle; k < 3 * (size_t)triangle + 3; k++)
         if (d3_length(d3_sub(wide(s->normal[k]), n)) > FLAT)
             return false;
     return true;
+}
+
+bool features_are_smooth(const struct scene *s, uint32_t first, uint32_t num)
+{
+    for (uint32_t i = first; i < first + num; i++)
+        if (!is_flat(s, i))
+            return true;
+    return false;
 }
 
 /* Along one axis, from p to the interval of a, b, c. */
@@ -145,9 +154,8 @@ unsigned features_of_scene(const struct scene *s, const struct camera *c)
         f |= light_features(&s->lights[i]);
     if (s->num_spheres > 0)
         f |= 1u << FEATURE_SPHERE;
-    for (uint32_t i = 0; i < s->num_triangles && !(f & 1u << FEATURE_SMOOTH); i++)
-        if (!features_triangle_is_flat(s, i))
-            f |= 1u << FEATURE_SMOOTH;
+    if (features_are_smooth(s, 0, s->num_triangles))
+        f |= 1u << FEATURE_SMOOTH;
     if (c->lens_radius > 0)
         f |= 1u << FEATURE_LENS;
     if (may_be_cut(s, c))
@@ -274,11 +282,31 @@ bool features_check_textures(const char *engine, const struct scene *s, struct e
     return true;
 }
 
+static bool check_light(const char *engine, const struct scene *s, uint32_t index, struct err *e)
+{
+    const struct light *l = &s->lights[index];
+    const float *a = l->attenuation;
+    if ((l->kind == LIGHT_POINT || l->kind == LIGHT_SPOT) &&
+        (a[0] != 0 || a[1] != 0 || !(a[2] > 0)))
+        return err_set(e, "%s: light %u: falloff 1/(%g + %g d + %g d^2) is not the inverse square",
+                       engine, index, (double)a[0], (double)a[1], (double)a[2]);
+    if (l->kind == LIGHT_SPOT && l->exponent != 0)
+        return err_set(e, "%s: light %u: no spot light that falls off as a power of the cosine",
+                       engine, index);
+    return l->kind != LIGHT_ENVIRONMENT || !environment_is_hidden(s->environment) ||
+           err_set(e, "%s has no ambient light that only rough surfaces receive", engine);
+}
+
 bool features_check_exportable(const char *engine, const struct scene *s, const struct camera *c,
                                struct err *e)
 {
     if (c->is_orthographic)
         return err_set(e, "%s: an orthographic camera cannot be expressed", engine);
-    return features_check_axes(engine, c, e) && features_check_clipping(engine, s, c, e) &&
-           features_check_normals(engine, s, e) && features_check_textures(engine, s, e);
+    if (!features_check_axes(engine, c, e) || !features_check_clipping(engine, s, c, e) ||
+        !features_check_normals(engine, s, e) || !features_check_textures(engine, s, e))
+        return false;
+    for (uint32_t i = 0; i < s->num_lights; i++)
+        if (!check_light(engine, s, i, e))
+            return false;
+    return true;
 }

@@ -34,8 +34,8 @@ extern const char *const feature_names[NUM_FEATURES + 1]; /* ends with NULL */
 /* Bit 1 << enum feature of all that image needs. */
 unsigned features_of_scene(const struct scene *s, const struct camera *c);
 
-/* True if a triangle's shading normals are its geometric normal, but for the rounding of text. */
-bool features_triangle_is_flat(const struct scene *s, uint32_t triangle);
+/* Has one of these triangles shading normals that are not its geometric normal, but for the rounding of text? */
+bool features_are_smooth(const struct scene *s, uint32_t first, uint32_t num);
 
 /* Distances from the eye: no more than that of the nearest point of the scene (a triangle counts with
  * the larger of its plane's and its box's), and that of the furthest. */
@@ -60,7 +60,8 @@ NODISCARD bool features_check_axes(const char *engine, const struct camera *c, s
 NODISCARD bool features_check_normals(const char *engine, const struct scene *s, struct err *e);
 /* Where a material has a texture. */
 NODISCARD bool features_check_textures(const char *engine, const struct scene *s, struct err *e);
-/* Axes, clipping, normals and textures. */
+/* Axes, clipping, normals and textures; a falloff that is not the inverse square, spot lights that are brighter in the middle, the
+ * ambient light of the assignment. */
 NODISCARD bool features_check_exportable(const char *engine, const struct scene *s,
                                          const struct camera *c, struct err *e);
 
