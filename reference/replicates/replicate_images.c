@@ -23,7 +23,7 @@ static float *read_rgb(const char *path, int width, int height, bool below_zero,
                        bool *half, struct err *e)
 {
     struct image im = {0};
-    bool fewer_bits;
+    bool fewer_bits = false;
     if (!(half != NULL ? image_read : image_read_exr)(path, &im, &fewer_bits, e))
         return NULL;
     const size_t values = 3 * (size_t)im.width * (size_t)im.height;

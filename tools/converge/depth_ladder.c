@@ -13,7 +13,7 @@ static double mean_of(const struct moments *m, double *se)
         double sd[3];
         for (int c = 0; c < 3; c++)
             sd[c] = sqrt(fmax(0, moments_var_of_mean(m, i, c)));
-        sum += luminance(&m->mean[3 * i]);
+        sum += luminance(m->mean + 3 * i);
         variance += luminance(sd) * luminance(sd);
     }
     *se = sqrt(variance) / (double)pixels;

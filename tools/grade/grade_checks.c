@@ -133,10 +133,11 @@ static bool find_usable(struct work *w, struct result *out, struct err *e)
 {
     static const double louder = 1.3, fewest = 0.3;
     size_t pixels = (size_t)student(w, 0)->width * (size_t)student(w, 0)->height, left = 0;
-    unsigned char *use = w->use = malloc(2 * pixels), *quiet = use + pixels;
+    unsigned char *use = w->use = malloc(2 * pixels);
     double kappa[CHECK_IMAGES];
     if (use == NULL)
         return err_set(e, "out of memory for %zu pixels", pixels);
+    unsigned char *quiet = use + pixels;
     for (size_t p = 0; p < pixels; p++)
         use[p] = !is_masked(w, student(w, 0), p);
     for (int k = 0; k < w->check->num_images; k++)

@@ -53,7 +53,7 @@ static uint8_t *shrink(const struct moments *m, int *width, int *height)
     *height = m->height / step;
     uint8_t *rgb8 = malloc(3 * (size_t)*width * (size_t)*height + 1);
     for (size_t i = 0; grey != NULL && i < pixels; i++)
-        grey[i] = luminance(&m->mean[3 * i]);
+        grey[i] = luminance(m->mean + 3 * i);
     bool capped;
     const double white = grey != NULL ? plot_display_white(grey, pixels, &capped) : 1;
     free(grey);

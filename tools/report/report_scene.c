@@ -88,7 +88,7 @@ static bool choose_white(struct scene *s, const json_t *claim, struct err *e)
     if (v == NULL)
         return err_set(e, "out of memory for the report");
     for (size_t i = 0; i < pixels; i++)
-        v[i] = luminance(&shot->m.mean[3 * i]);
+        v[i] = luminance(shot->m.mean + 3 * i);
     s->white = plot_display_white(v, pixels, &s->white_capped);
     s->anchor = shot->engine;
     free(v);
