@@ -394,7 +394,6 @@ static void run_here(long at, int argc, char **argv, char **env)
     close(out);
     close(err);
     unsetenv("NO_MEMORY");
-    unsetenv("LD_BIND_NOW");
     alarm(SECONDS);
     fail_at = at;
     armed = true;

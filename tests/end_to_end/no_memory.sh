@@ -28,7 +28,6 @@ no_memory() {
         [[ $name == $pattern ]] || continue
         mkdir "$tmp/case"
         [ -n "$start" ] && cp -R "$start" "$tmp/case/start"
-        # Symbols are looked up once, not in each run.
         NO_MEMORY=$tmp/case NO_MEMORY_NAME=$name NO_MEMORY_MOST=${NO_MEMORY_ALL:-$most} TMPDIR=$tmp/case/tmp "$@" 2>"$tmp/err" ||
             failures=$((failures + 1))
         rm -rf "$tmp/case"
