@@ -679,6 +679,15 @@ sed "s|^exec pathtracer|exec '$plain/mutants/point_light_linear/pathtracer'|" re
 chmod +x "$tmp/wrong_engine.sh"
 expect "a validation of a wrong engine" 1 "DIFFERENT" "$assay" validate --only 12_point_plane --engine "$tmp/wrong_engine.json" --out "$tmp/wrong_engine"
 expect "diagnose: the engine of a validation" 1 "tests/mutants/point_light_linear.patch" "$assay" diagnose "$tmp/wrong_engine/results.json"
+# Another program may lie off by less than the margin (0.3 % of Cycles), and is not accused of it; of 2 % it is.
+cp reference/engines/mine.sh "$tmp/scaled.sh"
+sed -i "s|^exec pathtracer|exec $pathtracer|" "$tmp/scaled.sh"
+for case in "1.002 0 nothing wrong found" "1.02 1 none of the"; do
+    read -r scale code words <<<"$case"
+    sed "s|{here}/mine.sh|$tmp/scaled.sh|; s|\"spp\": 32, \"replicates\": 64|\"spp\": 16, \"replicates\": 16, \"scale\": $scale|" reference/engines/mine.json >"$tmp/scaled.json"
+    "$assay" validate -q --only 12_point_plane --engine "$tmp/scaled.json" --out "$tmp/scaled" >"$tmp/out" 2>&1
+    expect "diagnose: an engine whose images are $scale times ours" "$code" "$words" "$assay" diagnose "$tmp/scaled/results.json"
+done
 plane="$pathtracer -q -m 1 -s 64 reference/scenes/12_point_plane.dae"
 $plane -r 48 48 -f "$tmp/plane.exr" >"$tmp/out" && $plane -r 40 40 -f "$tmp/odd.exr" >"$tmp/out"
 expect "diagnose: one image, larger than the catalogue's" 0 "nothing wrong found" \

@@ -45,8 +45,11 @@ static bool gate_mean(const struct observation *clue, double alpha, int num_test
         moments_free(&a);
         return false;
     }
-    const struct compare_options opt = {
-        .alpha = alpha / num_tests, .tile = greatest_divisor(clue->seen.columns, clue->seen.rows)};
+    const struct compare_options opt = {.alpha = alpha / num_tests,
+                                        .margin_global = clue->margin,
+                                        .margin_tile = clue->margin,
+                                        .tile =
+                                            greatest_divisor(clue->seen.columns, clue->seen.rows)};
     ok = compare_moments(&a, &b, &opt, &r, e) || err_prefix(e, "%s", clue->view->name);
     if (ok) {
         /* No test at all: everything is too skewed. */
@@ -405,8 +408,8 @@ struct evidence diagnose_evidence(const struct catalogue *c, const struct observ
     const struct bug_fit f = {.c = c, .clue = clue, .num_clues = 1};
     struct tally t = bug_fit_view(&f, 0, candidate), none = bug_fit_view(&f, 0, NULL);
     out.log_lead = t.log_likelihood - none.log_likelihood;
-    if (none.chi2 > none.chi2_mean + bug_fit_largest_excess * sqrt(2 * none.cells))
-        out.explained = t.all > 0 ? 1 - fmax(t.left, 0) / t.all : 0;
+    if (none.chi2 > none.chi2_mean + bug_fit_largest_excess * sqrt(2 * none.cells) && t.all > 0)
+        out.explained = 1 - fmax(t.left, 0) / t.all;
     if (e == NULL || !e->pixels)
         return out;
     double along = 0, norm = 0, tiny = bug_fit_rounding * signature_mean(correct);

@@ -11,6 +11,8 @@ struct observation {
     const struct view *view;
     struct signature seen; /* with the facts that are known */
     bool is_consistent; /* false: a claim of consistency came out DIFFERENT at its share of alpha */
+    double
+        margin; /* relative: by what conventions another program may differ from ours; 0: not at all */
 };
 
 struct diagnose_options {

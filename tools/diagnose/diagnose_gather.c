@@ -46,6 +46,18 @@ bool diagnose_gather_program(const struct diagnose_gather_options *opt, const ch
     return true;
 }
 
+/* Another program may sample another way: only its means are held against bugs, and by a margin only, which cells may lie off
+ * by as if it were noise. */
+static void allow_conventions(double margin, struct observation *clue)
+{
+    struct signature *s = &clue->seen;
+    clue->margin = margin;
+    for (int f = 0; f < NUM_FACTS; f++)
+        s->fact[f] = s->fact_sd[f] = NAN;
+    for (int i = 0; i < 3 * s->columns * s->rows; i++)
+        s->var[i] += pow(margin * clue->view->correct.mean[i], 2);
+}
+
 /* asked: 0 where an image does not say, and it matters only for adaptive sampling. */
 static bool read_image(const struct view *v, const char *path, int asked, bool is_ours,
                        struct observation *clue, struct err *e)
@@ -63,9 +75,6 @@ static bool read_image(const struct view *v, const char *path, int asked, bool i
         ok = err_set(e, "%s: width by height is not %d by %d", path, v->width, v->height);
     if (ok)
         finish(clue);
-    /* Another program may sample another way: only its means are held against bugs. */
-    for (int f = 0; ok && !is_ours && f < NUM_FACTS; f++)
-        clue->seen.fact[f] = clue->seen.fact_sd[f] = NAN;
     return ok;
 }
 
@@ -96,10 +105,12 @@ static const char *subject_of(const json_t *results)
     return ours;
 }
 
-/* The path of the image that claims of this scene and engine were judged by. */
+/* The path of the image that claims of this scene and engine were judged by, and the widest margin of one. */
 static bool find_image(const json_t *results, const char *json_path, const struct view *v,
-                       const char *subject, char *path)
+                       const char *subject, char *path, double *margin)
 {
+    bool found = false;
+    *margin = 0;
     const char *engine = v->variant[0] == '\0'        ? subject
                          : strcmp(subject, ours) == 0 ? v->variant
                                                       : "";
@@ -111,9 +122,10 @@ static bool find_image(const json_t *results, const char *json_path, const struc
             continue;
         const char *slash = strrchr(json_path, '/');
         int stem = file[0] == '/' || slash == NULL ? 0 : (int)(slash - json_path) + 1;
-        return snprintf(path, MAX_PATH, "%.*s%s", stem, json_path, file) < MAX_PATH;
+        found = snprintf(path, MAX_PATH, "%.*s%s", stem, json_path, file) < MAX_PATH;
+        *margin = fmax(*margin, member_number(claim, "margin_global"));
     }
-    return false;
+    return found;
 }
 
 static void add_consistency(const json_t *results, struct observation *clue)
@@ -149,13 +161,17 @@ bool diagnose_gather_results(const struct diagnose_gather_options *opt, const ch
         const struct suite_variant *variant;
         struct err why = {""};
         char image[MAX_PATH];
+        double margin;
         ok = catalogue_view_scene(v, opt->suite, &scene, &variant, e);
         if (!ok)
             break;
-        bool there = find_image(results, path, v, subject, image) || err_set(&why, "no image");
+        bool there =
+            find_image(results, path, v, subject, image, &margin) || err_set(&why, "no image");
         if (there && read_image(v, image, is_ours ? v->spp : 0, is_ours, &clue[*num], &why)) {
             if (is_ours)
                 add_consistency(results, &clue[*num]);
+            else
+                allow_conventions(margin, &clue[*num]);
             ++*num;
         } else {
             json_array_append_new(skipped,

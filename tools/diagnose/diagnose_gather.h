@@ -24,8 +24,8 @@ NODISCARD bool diagnose_gather_program(const struct diagnose_gather_options *opt
                                        struct err *e);
 
 /* Of the images and claims of consistency of a results.json by `assay validate`; of one with --engine, that engine's
- * images, of which only the means are held against bugs, as its noise may rightly be another. Views that it has no
- * image of, or of another shape, are left out and appended to `skipped` as {"view": , "reason": }. Fails
+ * images, of which only the means are held against bugs, as its noise may rightly be another, and they may lie off by the
+ * claims' margins. Views that it has no image of, or of another shape, are left out and appended to `skipped` as {"view": , "reason": }. Fails
  * if none is left. */
 NODISCARD bool diagnose_gather_results(const struct diagnose_gather_options *opt, const char *path,
                                        struct observation *clue, int *num, json_t *skipped,
