@@ -203,12 +203,9 @@ static bool render_seed(struct session *s, const struct camera *camera, const st
                         bool is_last, struct err *e)
 {
     const struct options *o = s->out.opt;
-    struct render_id id;
     struct film film = {0};
     bool ok = false;
-    s->out.id = &id;
-    if (!render_id_make(o, s->out.scene, &id, e) ||
-        !output_state_path(&s->out, NULL, s->state_path, e) || !start_film(s, o, &film, e))
+    if (!output_state_path(&s->out, NULL, s->state_path, e) || !start_film(s, o, &film, e))
         goto done;
     const struct render_options opt = render_options_of(o);
     if (o->heatmap != NULL && !write_heatmap(&s->out, bvh, camera, &opt, e))
@@ -234,7 +231,6 @@ static bool render_seed(struct session *s, const struct camera *camera, const st
     if (ok && stats.end == RENDER_ASKED)
         output_print_how_to_resume(&s->out, &film);
 done:
-    s->out.id = NULL; /* this function's own */
     film_free(&film);
     return ok;
 }
@@ -247,24 +243,26 @@ static bool render_one_of(struct session *s, int k, const struct camera *camera,
     const struct options *all = s->out.opt;
     const struct output out = s->out;
     struct options o = *all;
+    struct render_id id = *out.id;
     struct path name[MAX_OUTPUTS];
-    char seed[24], seed_option[] = "--seed", out_option[] = "-f";
+    char seed_option[] = "--seed", out_option[] = "-f";
     char **word = calloc((size_t)out.argc + 3 + 2 * MAX_OUTPUTS, sizeof *word);
     if (word == NULL)
         return err_set(e, "out of memory");
-    snprintf(seed, sizeof seed, "%llu", (unsigned long long)all->seeds[k]);
+    snprintf(id.seed, sizeof id.seed, "%llu", (unsigned long long)all->seeds[k]);
     int n = 0;
     word[n++] = out.argv[0];
     word[n++] = seed_option;
-    word[n++] = seed;
+    word[n++] = id.seed;
     for (int i = 0; i < o.num_outputs; i++) {
         const char *file = all->output[i], *dot = strrchr(file, '.');
-        name[i] = fs_path("%.*s_%s%s", (int)(dot - file), file, seed, dot);
+        name[i] = fs_path("%.*s_%s%s", (int)(dot - file), file, id.seed, dot);
         o.output[i] = name[i].s;
         word[n++] = out_option;
         word[n++] = name[i].s;
     }
     o.seed = all->seeds[k];
+    s->out.id = &id;
     o.heatmap = k == 0 ? o.heatmap : NULL;
     s->out.opt = &o;
     s->out.argc = n + cli_rewrite_kept(own, out.argc - 1, out.argv + 1, word + n);
@@ -280,9 +278,10 @@ static bool run(struct session *s, struct err *e)
     const struct options *o = s->out.opt;
     struct scene scene = {0};
     struct camera camera;
+    struct render_id id;
     struct bvh *bvh = NULL;
     bool ok = load_scene(o, &scene, e) && (o->num_seeds > 1 || output_check(&s->out, e)) &&
-              setup_camera(o, &scene, &camera, e);
+              setup_camera(o, &scene, &camera, e) && render_id_make(o, &scene, &id, e);
     double start = now_seconds();
     if (ok)
         bvh = bvh_build_on(&scene, (enum bvh_kind)o->accel, (enum isa)o->isa, o->threads, e);
@@ -291,13 +290,15 @@ static bool run(struct session *s, struct err *e)
         snprintf(s->out.accel, sizeof s->out.accel,
                  "%s: %u nodes, depth %d, SAH cost %.1f, built in %.3f s", bvh_kind_names[o->accel],
                  bvh_num_nodes(bvh), bvh_depth(bvh), bvh_sah_cost(bvh), now_seconds() - start);
+        s->out.id = &id;
         s->out.scene = &scene;
     }
     if (o->num_seeds < 2)
         ok = ok && render_seed(s, &camera, bvh, true, e);
     for (int k = 0; o->num_seeds > 1 && ok && k < o->num_seeds && s->signal == 0; k++)
         ok = render_one_of(s, k, &camera, bvh, e);
-    s->out.scene = NULL; /* this function's own */
+    s->out.id = NULL; /* this function's own */
+    s->out.scene = NULL;
     bvh_free(bvh);
     scene_free(&scene);
     return ok;
