@@ -34,10 +34,12 @@ cflags    = -std=c17 $(OPT) -ffp-contract=off $(WARN_C) -D_XOPEN_SOURCE=700 -pth
 # OpenImageIO is in oiio.so alone (renderer/image/image_oiio.h).
 cxxflags  = -std=c++17 -fPIC $(OPT) $(WARN) $(CXXFLAGS) -I. $(shell pkg-config --cflags OpenImageIO | sed 's/-I/-isystem /g')
 
-# Compiled once for each instruction set (renderer/base/isa.h), renderer/bvh/traverse_avx2.c.o say, and for one lane.
+# Compiled once for each instruction set (renderer/base/isa.h), renderer/bvh/traverse_avx2.c.o say. ONE_LANE: for one lane, too;
+# SIXTEEN: with sixteen lanes where there are such instructions, the others have eight children, triangles or bounds in theirs.
 ISAS     := sse42 avx2 avx512
-BY_ISA   := renderer/bvh/traverse renderer/bvh/sah_split renderer/transport/integrator_simd
+BY_ISA   := $(addprefix renderer/,bvh/traverse bvh/small_scene_trace bvh/sah_split transport/integrator_simd)
 ONE_LANE := renderer/transport/integrator_simd
+SIXTEEN  := renderer/transport/integrator_simd renderer/bvh/small_scene_trace
 isas_of   = $(ISAS) $(if $(filter $(ONE_LANE),$(1)),scalar)
 KERNELS  := $(foreach k,$(BY_ISA),$(patsubst %,$(k)_%.c,$(call isas_of,$(k))))
 MAINS    := renderer/pathtracer/pathtracer.c tools/commands/assay.c
@@ -141,9 +143,10 @@ isa_sse42  := -msse4.2
 isa_avx2   := -mavx2 -mfma -mbmi -mbmi2 -mpopcnt -mlzcnt
 isa_avx512 := $(isa_avx2) -mavx512f -mavx512vl -mavx512bw -mavx512dq
 # -Wno-psabi: no vector of 32 bytes leaves the file.
-isa_flags   = -DISA=$(1) $(if $(isa_$(1)),-DLANES=8) $(isa_$(1)) -Wno-psabi
+isa_lanes   = $(if $(and $(filter avx512,$(1)),$(filter $(SIXTEEN),$(2))),16,8)
+isa_flags   = -DISA=$(1) $(if $(isa_$(1)),-DLANES=$(isa_lanes)) $(isa_$(1)) -Wno-psabi
 define kernel_object
-$(1)/$(2)_$(3).c.o: CFLAGS += $(call isa_flags,$(3))
+$(1)/$(2)_$(3).c.o: CFLAGS += $(call isa_flags,$(3),$(2))
 $(1)/$(2)_$(3).c.o: $(2).c | $(4)
 	$$(compile_c)
 endef

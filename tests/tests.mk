@@ -108,7 +108,7 @@ endef
 $(BUILD)/clang/%.c.ok: %.c | $(BUILD)/deps-test
 	$(clang_ok)
 define kernel_ok
-$(BUILD)/clang/$(1)_$(2).c.ok: CFLAGS += $(call isa_flags,$(2))
+$(BUILD)/clang/$(1)_$(2).c.ok: CFLAGS += $(call isa_flags,$(2),$(1))
 $(BUILD)/clang/$(1)_$(2).c.ok: $(1).c | $(BUILD)/deps-test
 	$$(clang_ok)
 endef
@@ -148,7 +148,7 @@ $(patsubst %,$(BUILD)/lint/%.ok,$(LINT)): $(BUILD)/lint/%.ok: % .clang-tidy $(HE
 	$(call clang_tidy,-DASSAY_VERSION='""' -DASSAY_COMMIT='""')
 define kernel_lint
 $(BUILD)/lint/$(1)_$(2).c.ok: $(1).c .clang-tidy $(HEADERS) | $(BUILD)/deps-lint
-	$$(call clang_tidy,$(call isa_flags,$(2)),$(if $(filter sse42 avx512,$(2)),--checks=-clang-analyzer-*))
+	$$(call clang_tidy,$(call isa_flags,$(2),$(1)),$(if $(filter sse42 avx512,$(2)),--checks=-clang-analyzer-*))
 endef
 $(foreach k,$(BY_ISA),$(foreach i,$(call isas_of,$(k)),$(eval $(call kernel_lint,$(k),$(i)))))
 # Both are asked about planted faults first: who does not see them sees nothing (cppcheck is silent about a file that it cannot read).
@@ -271,7 +271,7 @@ print-sanitized:
 print-libs:
 	@echo $(LIBS)
 print-kernels:
-	@$(foreach k,$(BY_ISA),$(foreach i,$(call isas_of,$(k)),echo $(k)_$(i).c $(k).c $(call isa_flags,$(i));))
+	@$(foreach k,$(BY_ISA),$(foreach i,$(call isas_of,$(k)),echo $(k)_$(i).c $(k).c $(call isa_flags,$(i),$(k));))
 
 .PHONY: check lint order collada-cts blender-scenes threads tsan faults pairs slurm distros scale-live large scale coverage fuzz mutants machine-mutants catalogue diagnose-rates calibrate anchors \
   bench bench-rays bvh-table rubric-bugs writeup pictures print-compile print-sanitize print-sanitized print-libs print-kernels programs-san programs-clang programs-fuzz programs-no-memory

@@ -212,6 +212,7 @@ static bool add_list(struct build *b, struct wide_range *all)
         b->w->num_sphere_leaves += i >= triangles;
         i += r.count;
     }
+    b->w->num_list_leaves = b->w->num_leaves;
     b->w->cost = b->w->num_leaves;
     return true;
 }
@@ -266,11 +267,12 @@ struct wide *wide_build(const struct scene *s, enum isa isa, int threads, struct
 {
     static const struct {
         const struct traverse *kernel;
+        const struct small_scene_trace *list;
         const struct sah_split_passes *splitter;
     } code[] = {
-        [ISA_SSE42] = {&traverse_sse42, &sah_split_sse42},
-        [ISA_AVX2] = {&traverse_avx2, &sah_split_avx2},
-        [ISA_AVX512] = {&traverse_avx512, &sah_split_avx512},
+        [ISA_SSE42] = {&traverse_sse42, &small_scene_trace_sse42, &sah_split_sse42},
+        [ISA_AVX2] = {&traverse_avx2, &small_scene_trace_avx2, &sah_split_avx2},
+        [ISA_AVX512] = {&traverse_avx512, &small_scene_trace_avx512, &sah_split_avx512},
     };
     if (!isa_choose(&isa, e))
         return NULL;
@@ -280,6 +282,7 @@ struct wide *wide_build(const struct scene *s, enum isa isa, int threads, struct
     if (w == NULL)
         goto fail;
     w->kernel = code[isa].kernel;
+    w->list = code[isa].list;
     w->num_triangles = s->num_triangles;
     b.capacity = 64 * (size_t)all.count + 4096;
     w->arena = huge_alloc(b.capacity);

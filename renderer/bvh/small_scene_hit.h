@@ -1,18 +1,18 @@
-/* A list without a tree: eight rays at a time against every primitive, each ray sheared along its own
- * largest axis. Part of traverse.c. */
+/* Rays, a lane each, against every primitive of a list, each ray sheared along its own largest axis. Part of traverse.c
+ * and small_scene_trace.c. */
 #ifndef ASSAY_SMALL_SCENE_HIT_H
 #define ASSAY_SMALL_SCENE_HIT_H
 
 #include "small_scene.h"
-#include "hit8.h"
-#include "ray8.h"
+#include "hit_simd.h"
+#include "ray_simd.h"
 
 /* Corners as the rays see them; edge functions in both directions, so that a triangle finds its own. */
 struct list {
     vf x[FLAT_CORNERS], y[FLAT_CORNERS], z[FLAT_CORNERS], edge[FLAT_EDGES][2];
 };
 
-INLINE void list_init(const struct small_scene *f, const struct ray8 *q, struct list *l)
+INLINE void list_init(const struct small_scene *f, const struct rayv *q, struct list *l)
 {
     const vi is_x = vi_eq(q->axis, vi_set(0)), is_y = vi_eq(q->axis, vi_set(1));
     for (int i = 0; i < f->num_corners; i++) {
@@ -42,9 +42,9 @@ INLINE void list_init(const struct small_scene *f, const struct ray8 *q, struct 
 }
 
 /* Triangle i against all rays, as sheared_hit(); lanes that meet it inside (tmin, limit). No branches:
- * some ray of eight is almost always inside, and when not cannot be predicted. */
+ * some ray of eight or more is almost always inside, and when not cannot be predicted. */
 INLINE vi list_triangle(const struct small_scene *f, const struct list *l, int i,
-                        const struct ray8 *q, vf limit, vf *t, vf *u, vf *v)
+                        const struct rayv *q, vf limit, vf *t, vf *u, vf *v)
 {
     const uint8_t *c = f->triangle[i].corner, *e = f->triangle[i].edge;
     const vf *edge = l->edge[0], zero = vf_set(0);
@@ -64,21 +64,21 @@ INLINE vf below(vf a)
     return (vf)vi_select(zero, vi_set(INT32_MIN + 1), b + 1 + 2 * vi_lt(vi_set(-1), b));
 }
 
-INLINE vi list_sphere(const struct small_scene *f, int i, const struct ray8 *q, vf limit, vf *t)
+INLINE vi list_sphere(const struct small_scene *f, int i, const struct rayv *q, vf limit, vf *t)
 {
     const float *s = f->sphere[i];
     return sphere_hit(q->o[0] - s[0], q->o[1] - s[1], q->o[2] - s[2], q->d[0], q->d[1], q->d[2],
                       vf_set(s[3]), q->tmin, below(limit), t);
 }
 
-/* What eight rays meet first. prim: place in the list, -1: nothing. */
+/* What each ray meets first. prim: place in the list, -1: nothing. */
 struct list_hits {
     vf t, u, v;
     vi prim;
 };
 
 static __attribute__((noinline)) void
-list_closest_exact(const struct small_scene *f, const struct ray8 *q, struct list_hits *best)
+list_closest_exact(const struct small_scene *f, const struct rayv *q, struct list_hits *best)
 {
     struct list l;
     vf t = vf_set(0), u, v;
@@ -100,13 +100,13 @@ list_closest_exact(const struct small_scene *f, const struct ray8 *q, struct lis
     }
 }
 
-INLINE vi does_not_ignore(const struct small_scene *f, int i, const struct ray8 *q)
+INLINE vi does_not_ignore(const struct small_scene *f, int i, const struct rayv *q)
 {
     return ~vi_eq(q->ignore, vi_set(f->number[i]));
 }
 
 static __attribute__((noinline)) vi list_occluded_exact(const struct small_scene *f,
-                                                        const struct ray8 *q)
+                                                        const struct rayv *q)
 {
     struct list l;
     vf t, u, v;
@@ -126,7 +126,7 @@ struct quick {
     vi fit;
 };
 
-INLINE struct quick quick_init(const struct small_scene *f, const struct ray8 *q)
+INLINE struct quick quick_init(const struct small_scene *f, const struct rayv *q)
 {
     vf m = vf_max(vf_max(vf_abs(q->o[0]), vf_abs(q->o[1])), vf_abs(q->o[2]));
     m = vf_max(vf_set(f->reach), m);
@@ -145,7 +145,7 @@ struct quick_plane {
     vf nd, no;
 };
 
-INLINE struct quick_plane quick_plane(const struct flat_face *face, const struct ray8 *q)
+INLINE struct quick_plane quick_plane(const struct flat_face *face, const struct rayv *q)
 {
     const float *n = face->normal;
     const vf *o = q->o, *d = q->d;
@@ -164,7 +164,7 @@ INLINE vi quick_clear(const struct quick_plane *p, const struct quick *k)
 }
 
 INLINE struct quick_hit quick_face(const struct flat_face *face, const struct quick_plane *p,
-                                   const struct ray8 *q, const struct quick *k)
+                                   const struct rayv *q, const struct quick *k)
 {
     const float *ur = face->u_row, *vr = face->v_row;
     const vf *o = q->o, *d = q->d, nd = p->nd, no = p->no;
@@ -186,7 +186,7 @@ INLINE struct quick_hit quick_face(const struct flat_face *face, const struct qu
 
 /* The nearest hits of the lanes that the quick form can tell, of the others anything; which these
  * are. */
-INLINE vi list_closest_quick(const struct small_scene *f, const struct ray8 *q,
+INLINE vi list_closest_quick(const struct small_scene *f, const struct rayv *q,
                              struct list_hits *best)
 {
     const struct quick k = quick_init(f, q);
@@ -235,10 +235,10 @@ INLINE vi list_closest_quick(const struct small_scene *f, const struct ray8 *q,
     const vi is_x = vi_eq(q->axis, vi_set(0)), is_y = vi_eq(q->axis, vi_set(1));
     vi flat = vi_lt(prim, vi_set(f->num_triangles));
     int32_t number[LANES];
-    vf w[2][LANES], x[3], y[3], z[3], t = far, u = zero, v = zero;
+    vf w[2][COLUMNS], x[3], y[3], z[3], t = far, u = zero, v = zero;
     vf_store_any(number, (vf)(prim & flat & ~vi_lt(prim, vi_set(0))));
     gather_columns(f->row[0], FLAT_ROW, number, w[0]);
-    gather_columns(f->row[0] + LANES, FLAT_ROW, number, w[1]);
+    gather_columns(f->row[0] + COLUMNS, FLAT_ROW, number, w[1]);
     for (int c = 0; c < 3; c++) {
         vf a = w[0][3 * c] - q->o[0], b = (c < 2 ? w[0][3 * c + 1] : w[0][7]) - q->o[1];
         vf e = (c < 2 ? w[0][3 * c + 2] : w[1][0]) - q->o[2];
@@ -256,7 +256,7 @@ INLINE vi list_closest_quick(const struct small_scene *f, const struct ray8 *q,
 }
 
 /* Lanes that meet something; *known: those of which the quick form can tell. */
-INLINE vi list_occluded_quick(const struct small_scene *f, const struct ray8 *q, vi *known)
+INLINE vi list_occluded_quick(const struct small_scene *f, const struct rayv *q, vi *known)
 {
     const struct quick k = quick_init(f, q);
     const vf zero = vf_set(0);
@@ -264,7 +264,7 @@ INLINE vi list_occluded_quick(const struct small_scene *f, const struct ray8 *q,
     vi met = vi_set(0), maybe = vi_set(0);
     for (int i = 0; i < f->num_faces; i++) {
         const struct quick_plane p = quick_plane(&f->face[i], q);
-        if (bits(quick_clear(&p, &k)) == 255)
+        if (bits(quick_clear(&p, &k)) == ALL_LANES)
             continue;
         struct quick_hit h = quick_face(&f->face[i], &p, q, &k);
         vi out = vf_lt(h.inside + h.error, zero) | vf_lt(h.high, q->tmin) | vf_lt(q->tmax, h.low);
@@ -281,57 +281,22 @@ INLINE vi list_occluded_quick(const struct small_scene *f, const struct ray8 *q,
 }
 
 /* Sheared rays. */
-INLINE void list_closest_eight(const struct small_scene *f, const struct ray8 *q,
-                               struct list_hits *best)
+INLINE void list_closest(const struct small_scene *f, const struct rayv *q, struct list_hits *best)
 {
-    if (!f->quick || bits(list_closest_quick(f, q, best)) != 255)
+    if (!f->quick || bits(list_closest_quick(f, q, best)) != ALL_LANES)
         list_closest_exact(f, q, best);
 }
 
-/* Lanes that meet something. is_sheared: the rays are; else they will be if need be. */
-INLINE vi list_occluded_eight(const struct small_scene *f, struct ray8 *q, bool is_sheared)
+/* Lanes that meet something. The rays need not be sheared, and may be then. */
+INLINE vi list_occluded(const struct small_scene *f, struct rayv *q)
 {
     vi known = vi_set(0), met = known;
     if (f->quick)
         met = list_occluded_quick(f, q, &known);
-    if (bits(known) == 255)
+    if (bits(known) == ALL_LANES)
         return met;
-    if (!is_sheared)
-        octet_shear(q);
+    rayv_shear(q);
     return list_occluded_exact(f, q);
-}
-
-static __attribute__((noinline)) void list_closest(const struct wide *w, const struct rays *r,
-                                                   const uint16_t *lane, int n, struct hits *h,
-                                                   struct bvh_stats *stats)
-{
-    for (int k = 0; k < n; k += LANES) {
-        struct ray8 q;
-        struct list_hits best;
-        uint16_t filled[LANES];
-        const uint16_t *eight = eight_of(lane, k, n, filled);
-        octet_load(r, eight, &q);
-        octet_shear(&q);
-        list_closest_eight(w->flat, &q, &best);
-        stats->primitive_tests += w->num_leaves;
-        octet_store(&q, eight, best.t, best.u, best.v, best.prim, h);
-    }
-}
-
-static __attribute__((noinline)) void list_occluded(const struct wide *w, const struct rays *r,
-                                                    const uint16_t *lane, int n, bool *occluded,
-                                                    struct bvh_stats *stats)
-{
-    for (int k = 0; k < n; k += LANES) {
-        struct ray8 q;
-        uint16_t filled[LANES];
-        const uint16_t *eight = eight_of(lane, k, n, filled);
-        octet_load(r, eight, &q);
-        octet_ignore(r, eight, &q);
-        vi met = list_occluded_eight(w->flat, &q, false);
-        stats->primitive_tests += w->num_leaves;
-        octet_store_flags(&q, eight, bits(met), occluded);
-    }
 }
 
 #endif

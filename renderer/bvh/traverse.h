@@ -1,4 +1,4 @@
-/* The way of rays through the wide hierarchy, compiled once for each instruction set (isa.h). */
+/* The way of rays through the wide hierarchy, or past a scene that is a list, compiled once for each instruction set (isa.h). */
 #ifndef ASSAY_TRAVERSE_H
 #define ASSAY_TRAVERSE_H
 
@@ -12,6 +12,16 @@ struct traverse {
                      int num_lanes, bool *occluded, struct bvh_stats *stats);
 };
 
+/* The like for the list alone. left: the lanes that the tree is for, whose results are not the last yet; how many. */
+struct small_scene_trace {
+    int (*closest)(const struct wide *w, const struct rays *r, const uint16_t *lane, int num_lanes,
+                   struct hits *h, uint16_t *left, struct bvh_stats *stats);
+    int (*occluded)(const struct wide *w, const struct rays *r, const uint16_t *lane, int num_lanes,
+                    bool *occluded, uint16_t *left, struct bvh_stats *stats);
+};
+
 extern const struct traverse traverse_sse42, traverse_avx2, traverse_avx512;
+extern const struct small_scene_trace small_scene_trace_sse42, small_scene_trace_avx2,
+    small_scene_trace_avx512;
 
 #endif

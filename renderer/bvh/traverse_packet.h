@@ -3,19 +3,19 @@
 #ifndef ASSAY_TRAVERSE_PACKET_H
 #define ASSAY_TRAVERSE_PACKET_H
 
-#include "hit8.h"
-#include "ray8.h"
+#include "hit_simd.h"
+#include "ray_simd.h"
 #include "traverse_stack.h"
 
 /* Eight rays with the same axes of the shear, a ray to a lane, and what they have found. */
 struct packet {
-    const struct ray8 *q;
+    const struct rayv *q;
     int k[3];
     vf limit, u, v; /* limit -infinity: the ray meets nothing any more */
     vi prim;
 };
 
-INLINE void packet_init(const struct ray8 *q, struct packet *p)
+INLINE void packet_init(const struct rayv *q, struct packet *p)
 {
     p->q = q;
     p->k[2] = q->axis[0];
@@ -31,7 +31,7 @@ INLINE void packet_init(const struct ray8 *q, struct packet *p)
  * whoever meets something that it does not ignore. True if a ray met something. */
 INLINE bool packet_leaf(const struct wide_leaf *l, struct packet *p, bool spheres, bool any)
 {
-    const struct ray8 *q = p->q;
+    const struct rayv *q = p->q;
     vi changed = vi_set(0);
     for (int j = 0; j < WIDTH && l->prim[j] != NO_HIT; j++) {
         vf t, u, v;
@@ -93,7 +93,7 @@ struct bundle {
 
 /* Are the rays alike enough to go together? One sign and one largest axis, directions within a few
  * degrees, origins within w->alike. */
-INLINE bool are_alike(const struct wide *w, const struct ray8 *q)
+INLINE bool are_alike(const struct wide *w, const struct rayv *q)
 {
     vi alike = vi_eq(q->axis, vi_set(q->axis[0]));
     for (int a = 0; a < 3; a++) {
@@ -106,7 +106,7 @@ INLINE bool are_alike(const struct wide *w, const struct ray8 *q)
     return bits(alike) == 255;
 }
 
-static void bundle_init(const struct wide *w, const struct ray8 *q, struct bundle *b)
+static void bundle_init(const struct wide *w, const struct rayv *q, struct bundle *b)
 {
     float grow = largest(growth(w, q));
     for (int a = 0; a < 3; a++) {
@@ -170,12 +170,12 @@ INLINE void packet_traverse(const struct wide *w, const struct bundle *b, struct
 static void packet_result(const struct packet *p, const uint16_t *lane, struct hits *h)
 {
     vi none = vi_eq(p->prim, vi_set(NOTHING));
-    octet_store(p->q, lane, vf_select(none, p->q->tmax, p->limit), p->u, p->v, p->prim | none, h);
+    rayv_store(p->q, lane, vf_select(none, p->q->tmax, p->limit), p->u, p->v, p->prim | none, h);
 }
 
 static void packet_verdict(const struct packet *p, const uint16_t *lane, bool *occluded)
 {
-    octet_store_flags(p->q, lane, ~bits(vi_eq(p->prim, vi_set(NOTHING))) & 255, occluded);
+    rayv_store_flags(p->q, lane, ~vi_eq(p->prim, vi_set(NOTHING)), occluded);
 }
 
 #endif

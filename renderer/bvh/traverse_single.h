@@ -3,15 +3,15 @@
 #ifndef ASSAY_TRAVERSE_SINGLE_H
 #define ASSAY_TRAVERSE_SINGLE_H
 
-#include "hit8.h"
-#include "ray8.h"
+#include "hit_simd.h"
+#include "ray_simd.h"
 #include "traverse_stack.h"
 
 enum { ROW = sizeof(vf) };
 
 /* One ray, and what it has found. */
 struct single {
-    const struct ray8 *q; /* lane `lane` of it */
+    const struct rayv *q; /* lane `lane` of it */
     int lane;
     size_t row[3]; /* planes of entry, in bytes from the start of a node */
     int k[3];      /* axes of the shear */
@@ -31,7 +31,7 @@ INLINE vf splat(const vf *a, int i)
     return vf_set(lane_of(a, i));
 }
 
-INLINE void single_init(const struct ray8 *q, int lane, struct single *s)
+INLINE void single_init(const struct rayv *q, int lane, struct single *s)
 {
     static const int shear[3][3] = {{1, 2, 0}, {2, 0, 1}, {0, 1, 2}};
     s->q = q;
@@ -50,7 +50,7 @@ INLINE void single_init(const struct ray8 *q, int lane, struct single *s)
 INLINE vi single_leaf(const struct wide_leaf *l, const struct single *s, bool spheres, vf limit,
                       vf *t, vf *u, vf *v)
 {
-    const struct ray8 *q = s->q;
+    const struct rayv *q = s->q;
     const int i = s->lane;
     if (spheres) {
         *u = *v = vf_set(0);

@@ -1,8 +1,8 @@
-/* Lanes of float or of int32: vf, vi and vu (unsigned) hold LANES numbers each, one or eight as the Makefile says when
- * it compiles. + - * / and & | ^ ~ are operators on them, LANE() is a lane, the rest is below. The same source gives
- * every lane the same bits in either width. Truth is a lane of ones.
+/* Lanes of float or of int32: vf, vi and vu (unsigned) hold LANES numbers each, one, eight or sixteen as the Makefile
+ * says when it compiles. + - * / and & | ^ ~ are operators on them, LANE() is a lane, the rest is below. The same source gives
+ * every lane the same bits in every width. Truth is a lane of ones.
  *
- * In simd_one.h and simd_eight.h:
+ * In simd_one.h, simd_eight.h and simd_sixteen.h:
  *   vf_set, vi_set          the same number in all lanes
  *   vf_of_int, vi_truncate  conversions, the latter towards zero, |a| < 2^31
  *   vi_numbers              0, 1, 2, ...
@@ -41,6 +41,8 @@ enum { COLUMNS = 8, ALL_LANES = (1 << LANES) - 1 };
 
 #if LANES == 1
 #include "simd_one.h"
+#elif LANES == 16
+#include "simd_sixteen.h"
 #else
 #include "simd_eight.h"
 #endif

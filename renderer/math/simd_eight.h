@@ -1,6 +1,6 @@
 /* Eight lanes on the compiler's vector extensions (gcc and clang) and the machine's instructions: the same bits for
  * SSE4.2 (two halves), AVX2 and AVX-512, except through mul_sub() and mul_add(). Part of simd.h, which says what
- * each function does. This is the one file with intrinsics. */
+ * each function does. Intrinsics are in this file and in simd_sixteen.h alone. */
 #ifndef ASSAY_SIMD_EIGHT_H
 #define ASSAY_SIMD_EIGHT_H
 

@@ -209,7 +209,7 @@ INLINE int connect_rows(const struct integrator *it, struct batch *b, int first,
         load_vertex(b, k, &v);
         for (int i = 0; i < what->num; i++, j++) {
             unsigned cast = mask ? connect_once(it, b, k, &v, mask, what, simple, j, rays) : 0;
-            b->shadow_bits[j] = (uint8_t)cast;
+            b->shadow_bits[j] = (uint16_t)cast;
             b->shadow_first[j] = (uint16_t)rays;
             rays += __builtin_popcount(cast);
         }
@@ -301,7 +301,7 @@ static __attribute__((noinline)) void connect_hemisphere(const struct integrator
         v3_store(&b->shadow.d, k, wi);
         vf_store_any(b->shadow.tmin + k, vf_set(0));
         vf_store_any(b->shadow.tmax + k, vf_set(INFINITY));
-        b->shadow_bits[k / LANES] = (uint8_t)mask;
+        b->shadow_bits[k / LANES] = (uint16_t)mask;
         for (; mask; mask &= mask - 1)
             b->shadow_lane[rays++] = (uint16_t)(k + __builtin_ctz(mask));
     }

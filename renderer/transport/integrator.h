@@ -106,8 +106,7 @@ struct batch {
     struct rgbs gathered, reflectance;
     int32_t bits[BATCH_ROOM]; /* of the material's record */
     /* By as many paths as there are lanes, a bit each. */
-    uint8_t goes_on[BATCH_ROOM], shadow_bits[BATCH_ROOM];
-    uint16_t shadow_first[BATCH_ROOM];
+    uint16_t goes_on[BATCH_ROOM], shadow_bits[BATCH_ROOM], shadow_first[BATCH_ROOM];
     struct bvh_stats stats;
 };
 

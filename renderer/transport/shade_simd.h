@@ -139,7 +139,7 @@ static __attribute__((noinline)) void apply_textures(const struct integrator *it
         rgb r = rgb_mul(rgbs_get(&b->reflectance, i), texel);
         rgbs_set(&b->reflectance, i, r);
         if (rgb_is_zero(r) && m->kind == MATERIAL_DIFFUSE)
-            b->goes_on[k / LANES] &= (uint8_t) ~(1u << (i - k));
+            b->goes_on[k / LANES] &= (uint16_t) ~(1u << (i - k));
     }
 }
 
@@ -173,7 +173,7 @@ static void shade(const struct integrator *it, struct batch *b, int n, int verte
         vi_store_any(row, s.material);
         gather_columns(ls->material, MATERIAL_WORDS, row, material);
         vi about = as_vi(material[MATERIAL_BITS]);
-        b->goes_on[k / LANES] = (uint8_t)(there & ~bits(has_bits(about, MATERIAL_IS_BLACK)));
+        b->goes_on[k / LANES] = (uint16_t)(there & ~bits(has_bits(about, MATERIAL_IS_BLACK)));
         vec3v wo = negv(v3_load(&b->ray.d, k));
         vi front = vf_lt(vf_set(0), dotv(s.ng, wo));
         s.ng = v3_negate_if(~front, s.ng);

@@ -1,7 +1,7 @@
-/* Eight rays of a batch, lane by lane what boxes and primitives want of each. Part of
- * traverse.c. */
-#ifndef ASSAY_RAY8_H
-#define ASSAY_RAY8_H
+/* Rays of a batch, lane by lane what boxes and primitives want of each. Part of traverse.c and
+ * small_scene_trace.c. */
+#ifndef ASSAY_RAY_SIMD_H
+#define ASSAY_RAY_SIMD_H
 
 #include "bvh_wide.h"
 #include "renderer/math/simd.h"
@@ -10,7 +10,7 @@
 
 enum { NOTHING = INT32_MAX /* no primitive yet: more than any */ };
 
-struct ray8 {
+struct rayv {
     vf o[3], d[3], sx, sy, sz, tmin, tmax;
     vf limit; /* the largest float below tmax: a hit is at most that far, and another at the very same
                  distance counts only if its number is smaller */
@@ -22,20 +22,19 @@ struct ray8 {
     vi ignore;
 };
 
-/* a[lane[0]], ..., a[lane[7]] */
+/* a[lane[0]], a[lane[1]], ... */
 INLINE vf gather(const float *a, const uint16_t *lane, bool in_row)
 {
     vf v;
     if (in_row)
-        memcpy(&v, a + lane[0], sizeof v);
-    else
-        v = (vf){a[lane[0]], a[lane[1]], a[lane[2]], a[lane[3]],
-                 a[lane[4]], a[lane[5]], a[lane[6]], a[lane[7]]};
+        return vf_load_any(a + lane[0]);
+    for (int i = 0; i < LANES; i++)
+        v[i] = a[lane[i]];
     return v;
 }
 
 /* As shape_shear(). */
-INLINE void octet_shear(struct ray8 *q)
+INLINE void rayv_shear(struct rayv *q)
 {
     vf x = vf_abs(q->d[0]), y = vf_abs(q->d[1]), z = vf_abs(q->d[2]);
     vi is_x = vf_lt(y, x) & vf_lt(z, x), is_y = ~is_x & vf_lt(z, y);
@@ -46,7 +45,7 @@ INLINE void octet_shear(struct ray8 *q)
 }
 
 /* Origins, directions and ends. */
-INLINE void octet_load(const struct rays *r, const uint16_t lane[LANES], struct ray8 *q)
+INLINE void rayv_load(const struct rays *r, const uint16_t lane[LANES], struct rayv *q)
 {
     bool in_row = true;
     for (int i = 1; i < LANES; i++)
@@ -63,8 +62,8 @@ INLINE void octet_load(const struct rays *r, const uint16_t lane[LANES], struct 
 }
 
 /* Results of all lanes; prim -1: nothing. */
-INLINE void octet_store(const struct ray8 *q, const uint16_t lane[LANES], vf t, vf u, vf v, vi prim,
-                        struct hits *h)
+INLINE void rayv_store(const struct rayv *q, const uint16_t lane[LANES], vf t, vf u, vf v, vi prim,
+                       struct hits *h)
 {
     if (q->in_row) {
         vf_store_any(h->t + lane[0], t);
@@ -81,30 +80,40 @@ INLINE void octet_store(const struct ray8 *q, const uint16_t lane[LANES], vf t, 
     }
 }
 
-INLINE void octet_store_flags(const struct ray8 *q, const uint16_t lane[LANES], unsigned mask,
-                              bool *flag)
+INLINE void rayv_store_flags(const struct rayv *q, const uint16_t lane[LANES], vi mask, bool *flag)
 {
-    const uint64_t flags = bytes_of(mask);
+    bool flags[LANES];
+    store_flags(flags, mask);
     if (q->in_row)
-        memcpy(flag + lane[0], &flags, sizeof flags);
+        memcpy(flag + lane[0], flags, sizeof flags);
     else
         for (int i = 0; i < LANES; i++)
-            flag[lane[i]] = flags >> 8 * i & 1;
+            flag[lane[i]] = flags[i];
 }
 
-INLINE void octet_init(const struct rays *r, const uint16_t lane[LANES], struct ray8 *q)
+INLINE void rayv_init(const struct rays *r, const uint16_t lane[LANES], struct rayv *q)
 {
-    octet_load(r, lane, q);
+    rayv_load(r, lane, q);
     vi tmax = (vi)q->tmax;
     vi zero = vf_eq((vf)tmax, vf_set(0));
     q->limit = (vf)vi_select(zero, vi_set(INT32_MIN + 1), tmax + 1 + 2 * vi_lt(vi_set(-1), tmax));
-    octet_shear(q);
+    rayv_shear(q);
     q->u = q->v = vf_set(0);
     q->prim = vi_set(NOTHING);
 }
 
-/* Lanes k .. k+7 of a list of n; behind its end the last again. */
-static inline const uint16_t *eight_of(const uint16_t *lane, int k, int n, uint16_t filled[LANES])
+/* What has been met so far is in h. */
+INLINE void rayv_go_on(const struct hits *h, const uint16_t lane[LANES], struct rayv *q)
+{
+    vi prim = (vi)gather((const float *)h->prim, lane, q->in_row), met = vi_lt(vi_set(-1), prim);
+    q->limit = vf_select(met, gather(h->t, lane, q->in_row), q->limit);
+    q->prim = vi_select(met, prim, q->prim);
+    q->u = gather(h->u, lane, q->in_row);
+    q->v = gather(h->v, lane, q->in_row);
+}
+
+/* As many of a list of n as there are lanes, from k on; behind its end the last again. */
+static inline const uint16_t *rayv_from(const uint16_t *lane, int k, int n, uint16_t filled[LANES])
 {
     if (n - k >= LANES)
         return lane + k;
@@ -113,18 +122,15 @@ static inline const uint16_t *eight_of(const uint16_t *lane, int k, int n, uint1
     return filled;
 }
 
-INLINE void octet_ignore(const struct rays *r, const uint16_t lane[LANES], struct ray8 *q)
+INLINE void rayv_ignore(const struct rays *r, const uint16_t lane[LANES], struct rayv *q)
 {
-    const uint32_t *a = r->ignore;
-    q->ignore =
-        (vi){(int32_t)a[lane[0]], (int32_t)a[lane[1]], (int32_t)a[lane[2]], (int32_t)a[lane[3]],
-             (int32_t)a[lane[4]], (int32_t)a[lane[5]], (int32_t)a[lane[6]], (int32_t)a[lane[7]]};
+    q->ignore = (vi)gather((const float *)r->ignore, lane, q->in_row);
 }
 
 /* What the coordinates of boxes are grown by. The triangle test moves corners by at most 6 half steps
  * of float of their distance from the origin [Woop13 3.3]; reciprocal, products and difference of the
  * slabs come to no more than 4 of distance and coordinate together. Twice that. */
-INLINE vf growth(const struct wide *w, const struct ray8 *q)
+INLINE vf growth(const struct wide *w, const struct rayv *q)
 {
     vf reach = vf_set(0), coordinate = reach;
     for (int a = 0; a < 3; a++) {
@@ -141,7 +147,7 @@ INLINE vf inverse(vf d, vf grow)
     return 1 / vf_select(vf_lt(vf_abs(d), tiny), (vf)((vi)tiny | (vi)sign), d);
 }
 
-INLINE void octet_slabs(const struct wide *w, struct ray8 *q)
+INLINE void rayv_slabs(const struct wide *w, struct rayv *q)
 {
     vf grow = growth(w, q);
     for (int a = 0; a < 3; a++) {
@@ -152,7 +158,7 @@ INLINE void octet_slabs(const struct wide *w, struct ray8 *q)
 }
 
 /* Lanes that meet the tree's box within (tmin, limit]. */
-INLINE unsigned octet_box(const struct wide *w, const struct ray8 *q)
+INLINE unsigned rayv_box(const struct wide *w, const struct rayv *q)
 {
     vf begin = q->tmin, end = q->limit;
     for (int a = 0; a < 3; a++) {

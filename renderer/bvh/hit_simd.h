@@ -1,8 +1,8 @@
 /* Eight pairs of a ray and a triangle or sphere, by the tests of shape.c, operation by operation, so
  * that a hit has the same bits. Whether the lanes are rays or primitives is the caller's matter. Part
  * of traverse.c. */
-#ifndef ASSAY_HIT8_H
-#define ASSAY_HIT8_H
+#ifndef ASSAY_HIT_SIMD_H
+#define ASSAY_HIT_SIMD_H
 
 #include "renderer/math/simd.h"
 

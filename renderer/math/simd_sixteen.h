@@ -1,0 +1,186 @@
+/* Sixteen lanes on the compiler's vector extensions (gcc and clang) and AVX-512, with the bits of simd_eight.h. Part of
+ * simd.h, which says what each function does. */
+#ifndef ASSAY_SIMD_SIXTEEN_H
+#define ASSAY_SIMD_SIXTEEN_H
+
+#include <immintrin.h>
+
+typedef float vf __attribute__((vector_size(64)));
+typedef int32_t vi __attribute__((vector_size(64)));
+typedef uint32_t vu __attribute__((vector_size(64)));
+
+/* Lane i, to read or to write. */
+#define LANE(v, i) ((v)[i])
+
+INLINE vf vf_set(float x)
+{
+    return (vf)_mm512_set1_ps(x);
+}
+INLINE vi vi_set(int32_t x)
+{
+    return (vi)_mm512_set1_epi32(x);
+}
+INLINE vf vf_of_int(vi a)
+{
+    return __builtin_convertvector(a, vf);
+}
+INLINE vi vi_truncate(vf a)
+{
+    return __builtin_convertvector(a, vi);
+}
+INLINE vi vi_numbers(void)
+{
+    return (vi){0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+}
+INLINE vi vi_divide(vi a, int by)
+{
+    __m256i half[2] = {_mm512_castsi512_si256((__m512i)a),
+                       _mm512_extracti64x4_epi64((__m512i)a, 1)};
+    for (int i = 0; i < 2; i++)
+        half[i] = _mm512_cvttpd_epi32((_mm512_cvtepi32_pd(half[i]) + 0.5) * (1.0 / by));
+    return (vi)_mm512_inserti64x4(_mm512_castsi256_si512(half[0]), half[1], 1);
+}
+INLINE vf vf_min(vf a, vf b)
+{
+    return (vf)_mm512_min_ps((__m512)a, (__m512)b);
+}
+INLINE vf vf_max(vf a, vf b)
+{
+    return (vf)_mm512_max_ps((__m512)a, (__m512)b);
+}
+INLINE vf vf_sqrt(vf a)
+{
+    return (vf)_mm512_sqrt_ps((__m512)a);
+}
+INLINE vf vf_hypot(vf a, vf b)
+{
+    __m256 r[2];
+    for (int i = 0; i < 2; i++) {
+        __m512d x = _mm512_cvtps_pd(i ? _mm512_extractf32x8_ps((__m512)a, 1)
+                                      : _mm512_castps512_ps256((__m512)a));
+        __m512d y = _mm512_cvtps_pd(i ? _mm512_extractf32x8_ps((__m512)b, 1)
+                                      : _mm512_castps512_ps256((__m512)b));
+        r[i] = _mm512_cvtpd_ps(_mm512_sqrt_pd(x * x + y * y));
+    }
+    return (vf)_mm512_insertf32x8(_mm512_castps256_ps512(r[0]), r[1], 1);
+}
+INLINE vf mul_sub(vf a, vf b, vf c)
+{
+    return (vf)_mm512_fmsub_ps((__m512)a, (__m512)b, (__m512)c);
+}
+INLINE vf mul_add(vf a, vf b, vf c)
+{
+    return (vf)_mm512_fmadd_ps((__m512)a, (__m512)b, (__m512)c);
+}
+INLINE vi lanes_of(unsigned mask)
+{
+    return (vi)_mm512_movm_epi32((__mmask16)mask);
+}
+INLINE vi vf_lt(vf a, vf b)
+{
+    return lanes_of(_mm512_cmp_ps_mask((__m512)a, (__m512)b, _CMP_LT_OQ));
+}
+INLINE vi vf_le(vf a, vf b)
+{
+    return lanes_of(_mm512_cmp_ps_mask((__m512)a, (__m512)b, _CMP_LE_OQ));
+}
+INLINE vi vf_eq(vf a, vf b)
+{
+    return lanes_of(_mm512_cmp_ps_mask((__m512)a, (__m512)b, _CMP_EQ_OQ));
+}
+INLINE vi vi_lt(vi a, vi b)
+{
+    return lanes_of(_mm512_cmplt_epi32_mask((__m512i)a, (__m512i)b));
+}
+INLINE vi vi_eq(vi a, vi b)
+{
+    return lanes_of(_mm512_cmpeq_epi32_mask((__m512i)a, (__m512i)b));
+}
+INLINE vf vf_select(vi mask, vf yes, vf no)
+{
+    return (vf)_mm512_ternarylogic_epi32((__m512i)mask, (__m512i)yes, (__m512i)no, 0xCA);
+}
+INLINE unsigned bits(vi mask)
+{
+    return _mm512_movepi32_mask((__m512i)mask);
+}
+INLINE vi front_order(unsigned mask)
+{
+    return (vi)_mm512_maskz_compress_epi32((__mmask16)mask, (__m512i)vi_numbers());
+}
+INLINE vf pick(vf a, vi order)
+{
+    return (vf)_mm512_permutexvar_ps((__m512i)order, (__m512)a);
+}
+INLINE void store_flags(void *flags, vi mask)
+{
+    _mm_storeu_si128(flags, _mm_maskz_set1_epi8((__mmask16)bits(mask), 1));
+}
+INLINE unsigned spread_flags(const void *flags, unsigned mask)
+{
+    const __m128i set = _mm_loadu_si128(flags);
+    return _pdep_u32(_mm_test_epi8_mask(set, set), mask);
+}
+
+/* Each byte turned by its halves, which are looked up, and the bytes of each number turned. */
+INLINE vu vu_reverse_bits(vu a)
+{
+    const __m512i nibbles = _mm512_set4_epi32(0x0F070B03, 0x0D050901, 0x0E060A02, 0x0C040800);
+    const __m512i bytes = _mm512_set4_epi32(0x0C0D0E0F, 0x08090A0B, 0x04050607, 0x00010203);
+    __m512i low = _mm512_shuffle_epi8(_mm512_slli_epi32(nibbles, 4), (__m512i)(a & 0x0F0F0F0F));
+    __m512i high = _mm512_shuffle_epi8(nibbles, (__m512i)(a >> 4 & 0x0F0F0F0F));
+    return (vu)_mm512_shuffle_epi8(low | high, bytes);
+}
+
+typedef struct {
+    __m512i even, odd;
+} vw;
+INLINE vw vw_of(vu a)
+{
+    return (vw){(__m512i)a, _mm512_srli_epi64((__m512i)a, 32)};
+}
+INLINE vu vu_of(vw a)
+{
+    return (vu)_mm512_mask_blend_epi32(0xAAAA, a.even, _mm512_slli_epi64(a.odd, 32));
+}
+INLINE vw vw_mul(vw a, uint32_t k)
+{
+    const __m512i by = _mm512_set1_epi64(k);
+    return (vw){_mm512_mul_epu32(a.even, by), _mm512_mul_epu32(a.odd, by)};
+}
+INLINE vw vw_high(vw a)
+{
+    return (vw){_mm512_srli_epi64(a.even, 32), _mm512_srli_epi64(a.odd, 32)};
+}
+INLINE vw vw_xor(vw a, vw b, uint32_t k)
+{
+    const __m512i c = _mm512_set1_epi64(k);
+    return (vw){_mm512_ternarylogic_epi64(a.even, b.even, c, 0x96),
+                _mm512_ternarylogic_epi64(a.odd, b.odd, c, 0x96)};
+}
+
+/* Sixteen rows of eight, turned: fourths of rows i, 4 + i, 8 + i, 12 + i side by side, then each four by four. */
+INLINE void gather_columns(const float *base, size_t stride, const int32_t index[LANES],
+                           vf column[COLUMNS])
+{
+    for (int c = 0; c < COLUMNS; c += 4) {
+        __m512 a[4];
+        for (int i = 0; i < 4; i++) {
+            __m128 part[4];
+            for (int k = 0; k < 4; k++)
+                part[k] = _mm_loadu_ps(base + stride * (size_t)index[4 * k + i] + c);
+            a[i] = _mm512_castps128_ps512(part[0]);
+            a[i] = _mm512_insertf32x4(a[i], part[1], 1);
+            a[i] = _mm512_insertf32x4(a[i], part[2], 2);
+            a[i] = _mm512_insertf32x4(a[i], part[3], 3);
+        }
+        __m512 low01 = _mm512_unpacklo_ps(a[0], a[1]), low23 = _mm512_unpacklo_ps(a[2], a[3]);
+        __m512 high01 = _mm512_unpackhi_ps(a[0], a[1]), high23 = _mm512_unpackhi_ps(a[2], a[3]);
+        column[c] = (vf)_mm512_shuffle_ps(low01, low23, 0x44);
+        column[c + 1] = (vf)_mm512_shuffle_ps(low01, low23, 0xEE);
+        column[c + 2] = (vf)_mm512_shuffle_ps(high01, high23, 0x44);
+        column[c + 3] = (vf)_mm512_shuffle_ps(high01, high23, 0xEE);
+    }
+}
+
+#endif
