@@ -177,6 +177,25 @@ static bool is_of_one_part(const struct bug *a, const struct bug *b)
     return n == strcspn(b->where, ",") && strncmp(a->where, b->where, n) == 0;
 }
 
+/* Does its effect stand out of its own noise in a view? Random numbers that are shared move an image by chance: what was stored
+ * is one throw, and beside another bug it explains whatever is left. */
+static bool is_reproducible(const struct bug_fit *f, int bug)
+{
+    static const double least = 10; /* mean square over variance; of such bugs it is 6 at most */
+    for (int k = 0; k < f->num_clues; k++) {
+        const struct view *v = f->clue[k].view;
+        const struct effect *e = v->effect[bug];
+        const int values = 3 * v->correct.columns * v->correct.rows;
+        double sum = 0;
+        for (int i = 0; e != NULL && i < values; i++)
+            if (e->mean[i] != 0)
+                sum += pow((double)e->mean[i], 2) / (double)e->var[i];
+        if (sum >= least * values)
+            return true;
+    }
+    return false;
+}
+
 /* The likeliest singles, each with every other bug of another part; likeliest first. */
 static int rank_pairs(const struct bug_fit *f, const struct candidate *single, int num,
                       struct candidate *pair)
@@ -184,7 +203,8 @@ static int rank_pairs(const struct bug_fit *f, const struct candidate *single, i
     int pairs = 0;
     for (int i = 0; i < num && i < LEADERS; i++)
         for (int k = i + 1; k < num; k++)
-            if (!is_of_one_part(&f->c->bug[single[i].bug], &f->c->bug[single[k].bug]))
+            if (!is_of_one_part(&f->c->bug[single[i].bug], &f->c->bug[single[k].bug]) &&
+                is_reproducible(f, single[i].bug) && is_reproducible(f, single[k].bug))
                 pair[pairs++] = bug_fit_at(f, single[i].bug, single[k].bug, 1);
     qsort(pair, (size_t)pairs, sizeof *pair, by_likelihood);
     return pairs;

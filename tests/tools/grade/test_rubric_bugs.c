@@ -139,6 +139,14 @@ TEST(two_bugs_that_do_not_multiply_have_both_names)
     assert_false(both_are_named(near[0], near[1], 3, &excess));
 }
 
+/* What shared random numbers did to the stored images is one throw, and no reason beside another bug. */
+TEST(a_throw_is_not_one_of_two)
+{
+    double excess;
+    assert_false(
+        both_are_named("cosine_sample_uniform_pdf", "pixels_share_random_numbers", 0, &excess));
+}
+
 /* A bug that is not in the catalogue is not called by the name of a relative: each of these has some that look like it. */
 TEST(an_unknown_bug_has_no_name)
 {
