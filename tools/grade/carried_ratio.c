@@ -140,6 +140,39 @@ static bool same_view(const struct rubric_image *a, const struct rubric_image *b
            a->width == b->width && a->height == b->height;
 }
 
+/* Is it what the earlier image of the view should be, in each channel and tile, so that it shows no bounce more than that? */
+static bool is_what_was_asked_before(const struct grading *g, const struct rubric_check *c,
+                                     bool *is, struct err *e)
+{
+    const struct rubric *r = g->r;
+    const struct rubric_image *now = &r->image[c->images[0]], *before = &r->image[c->after];
+    const struct submitted_image *p = &g->h->image[c->images[0]];
+    const size_t pixels = (size_t)p->width * (size_t)p->height;
+    unsigned char *use = malloc(pixels);
+    bool ok = use != NULL || err_set(e, "out of memory");
+    *is = false;
+    for (size_t k = 0; ok && k < pixels; k++)
+        use[k] = !rubric_masks(r, p->width, p->height, k);
+    for (int set = 0;
+         ok && set < r->num_sets && same_view(now, before) && before->bounces < now->bounces;
+         set++) {
+        struct submitted_image right = {0};
+        struct difference d;
+        struct err why; /* not comparable */
+        ok = submitted_image_from(answer_key_image(g->a, set, c->after), p, &right, e);
+        if (ok && difference_measure(p, &right, use, g->alpha, &d, &why)) {
+            double share = score_share(&c->tile, &d.tile);
+            for (int k = 0; k < NUM_CHANNELS; k++)
+                share = fmin(share, score_share(&c->image, &d.image[k]));
+            *is = *is || share == 1;
+            difference_free(&d);
+        }
+        submitted_image_free(&right);
+    }
+    free(use);
+    return ok;
+}
+
 /* P/B as it should be where a wrong BSDF makes B, direct light, s times as bright: each bounce has the factor once more. Of an image
  * of all bounces their radiances are taken for a geometric series; an image that is darker than B shows the last alone. */
 static double ratio_of_bounces(double right, double s, int bounces)
@@ -346,10 +379,12 @@ bool carried_by_ratio(const struct grading *g, int set, const double *share, con
         if (result[i].share == 1 || paid[c->part] || !result[i].judged || !is_there(g->h, c))
             continue;
         /* Deviations that are accepted are not recognised where a mistake is in all images that show them. */
-        if (c->after >= 0 && was_lost(r, c, c->after, p, share))
-            for (int k = 0; ok && k < r->num_sets; k++)
+        if (c->after >= 0 && was_lost(r, c, c->after, p, share)) {
+            bool shows_no_more;
+            ok = is_what_was_asked_before(g, c, &shows_no_more, e);
+            for (int k = 0; ok && !shows_no_more && k < r->num_sets; k++)
                 ok = carry_ratio(g, k, c, is_drawn(r, c, result), &result[i], e);
-        else if (c->kind == CHECK_RATES && was_lost(r, c, -1, p, share))
+        } else if (c->kind == CHECK_RATES && was_lost(r, c, -1, p, share))
             ok = carry_rates(g, set, c, &result[i], e);
         else if (c->kind == CHECK_GROWTH)
             ok = carry_growth(g, set, c, &result[i], e);

@@ -9,7 +9,7 @@
  * `equal` with `after IMAGE`, where a check of an earlier part on that image lost points: R = (P'/P)/(B'/B), P the
  * image's mean luminance, B that of IMAGE, primes the student's, of any accepted deviations; log R against the margin `carried`. Where IMAGE
  * is direct light, P has the factor B'/B at every bounce (a wrong BSDF), or as B (wrong light), whichever is nearer. An image that is
- * the other one again, or does not look like what it should show (where there is something to
+ * the other one again, or what that should be of fewer bounces (its direct light may depend on -l), or does not look like what it should show (where there is something to
  * see, or no other image of the scene is right), carries nothing on.
  * `rates` of a scene of which an earlier part lost points: the logarithm of the number of samples over ours against that margin.
  * `noise`: against another image of the program's own with more samples, instead of the right one. False: out of memory. */

@@ -212,6 +212,23 @@ TEST(what_is_missing_is_not_carried_on)
     assert_true(share_of(&v, "second_bounce") == 0);
 }
 
+/* Nor where direct light, too dark by what -l asks for, is by chance as much below that image as bounces are above it. */
+TEST(an_image_without_bounces_is_not_carried_on)
+{
+    struct submitted_images *h =
+        bug_images_hand_in(&of, 0, bug_images_number(&of, "indirect_missing"), -1, 1);
+    int direct = 0;
+    while (strcmp(of.rubric->image[direct].name, "corner_direct") != 0)
+        direct++;
+    struct submitted_image *p = &h->image[direct];
+    for (size_t k = 0; k < 3 * (size_t)p->width * (size_t)p->height; k++)
+        p->mean[k] *= 0.8;
+    struct outcome v = grade(h);
+    bug_images_take_back(&of, h);
+    assert_true(share_of(&v, "corner") == 0);
+    assert_true(share_of(&v, "five_bounces") == 0);
+}
+
 TEST(a_mistake_without_a_name_is_located)
 {
     static const struct {
