@@ -78,27 +78,28 @@ INLINE vi lanes_of(unsigned mask)
 }
 INLINE vi vf_lt(vf a, vf b)
 {
-    return lanes_of(_mm512_cmp_ps_mask((__m512)a, (__m512)b, _CMP_LT_OQ));
+    return a < b;
 }
 INLINE vi vf_le(vf a, vf b)
 {
-    return lanes_of(_mm512_cmp_ps_mask((__m512)a, (__m512)b, _CMP_LE_OQ));
+    return a <= b;
 }
 INLINE vi vf_eq(vf a, vf b)
 {
-    return lanes_of(_mm512_cmp_ps_mask((__m512)a, (__m512)b, _CMP_EQ_OQ));
+    return a == b;
 }
 INLINE vi vi_lt(vi a, vi b)
 {
-    return lanes_of(_mm512_cmplt_epi32_mask((__m512i)a, (__m512i)b));
+    return a < b;
 }
 INLINE vi vi_eq(vi a, vi b)
 {
-    return lanes_of(_mm512_cmpeq_epi32_mask((__m512i)a, (__m512i)b));
+    return a == b;
 }
+/* Written so that gcc sees a mask register in it. */
 INLINE vf vf_select(vi mask, vf yes, vf no)
 {
-    return (vf)_mm512_ternarylogic_epi32((__m512i)mask, (__m512i)yes, (__m512i)no, 0xCA);
+    return (vf)((mask & (vi)yes) | (~mask & (vi)no));
 }
 INLINE unsigned bits(vi mask)
 {
