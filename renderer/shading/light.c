@@ -55,25 +55,35 @@ static double triangle_weight(const struct scene *s, const struct light *l, uint
     return l->textured && mean > 0 ? 0.1 + 0.9 * texture_luminance(s, l, i) / mean : 1;
 }
 
-/* Records of the triangles of all lights. */
+/* A row for each light, records of the triangles of all. */
 static bool build_records(struct light_table *t, const struct scene *s)
 {
     uint32_t num = 0;
-    t->first = calloc((size_t)s->num_lights + 1, sizeof *t->first);
-    for (uint32_t l = 0; t->first != NULL && l < s->num_lights; l++) {
-        t->first[l] = num;
+    t->row = calloc((size_t)s->num_lights + 1, sizeof *t->row);
+    for (uint32_t l = 0; t->row != NULL && l < s->num_lights; l++) {
+        t->row[l].first = (int32_t)num;
         num += s->lights[l].kind == LIGHT_TRIANGLES ? s->lights[l].count : 0;
     }
     t->lamp = calloc((size_t)num + 1, LAMP_WORDS * sizeof *t->lamp);
-    if (t->first == NULL || t->lamp == NULL)
+    if (t->row == NULL || t->lamp == NULL)
         return false;
     for (uint32_t l = 0; l < s->num_lights; l++) {
         const struct light *light = &s->lights[l];
+        struct light_row *row = &t->row[l];
         double area = 0, mean = light->textured ? light_luminance(s, light) : 0;
         for (uint32_t i = 0; light->kind == LIGHT_TRIANGLES && i < light->count; i++)
             fill_record(s->position + 3 * (size_t)(light->first + i),
                         triangle_weight(s, light, i, mean), &area,
-                        t->lamp + LAMP_WORDS * (size_t)(t->first[l] + i));
+                        t->lamp + LAMP_WORDS * ((size_t)row->first + i));
+        if (light_is_delta(light) || light->kind == LIGHT_ENVIRONMENT)
+            continue;
+        const struct material *m = material_of(s, light);
+        row->radiance = m->radiance;
+        row->pdf_a = 1 / light->area;
+        row->both_sides = -m->radiance_both_sides;
+        row->area = (float)area;
+        row->untextured =
+            light->kind == LIGHT_TRIANGLES && !light->textured ? (int32_t)light->count : 0;
     }
     return true;
 }
@@ -200,7 +210,7 @@ void light_table_free(struct light_table *t)
     if (t == NULL)
         return;
     free(t->lamp);
-    free(t->first);
+    free(t->row);
     light_clusters_free(t->all);
     light_clusters_free(t->delta);
     free(t);

@@ -18,10 +18,19 @@ enum {
     LAMP_WORDS = 16
 };
 
+/* A light as a row of COLUMNS words. */
+struct light_row {
+    rgb radiance;
+    float pdf_a;
+    int32_t both_sides;        /* lanes of truth */
+    int32_t first, untextured; /* its first record; how many it has, 0 with a texture */
+    float area;                /* as its last record says */
+};
+
 struct light_table {
     const struct scene *scene;
     float *lamp;                        /* records of the triangles of all lights */
-    uint32_t *first;                    /* by light: its first record */
+    struct light_row *row;              /* by light */
     struct light_clusters *all, *delta; /* choices among all lights and among the delta lights */
     uint32_t num_areas;
 };
@@ -55,23 +64,19 @@ INLINE struct light_samplev light_sample_select(vi mask, const struct light_samp
 struct lamp {
     const float *record; /* triangles: of the first */
     int count;
-    float pdf_a;
-    rgb radiance;
-    bool both_sides;
+    vf pdf_a;
+    rgbv radiance;
+    vi both_sides;
 };
 
 static inline struct lamp lamp_of(const struct light_table *t, uint32_t l)
 {
-    const struct scene *s = t->scene;
-    const struct light *light = &s->lights[l];
-    const bool flat = light->kind == LIGHT_TRIANGLES;
-    const struct material *m =
-        &s->materials[flat ? s->tri_material[light->first] : s->sphere_material[light->first]];
-    return (struct lamp){.record = t->lamp + LAMP_WORDS * (size_t)t->first[l],
-                         .count = (int)light->count,
-                         .pdf_a = 1 / light->area,
-                         .radiance = m->radiance,
-                         .both_sides = m->radiance_both_sides};
+    const struct light_row *row = &t->row[l];
+    return (struct lamp){.record = t->lamp + LAMP_WORDS * (size_t)row->first,
+                         .count = (int)t->scene->lights[l].count,
+                         .pdf_a = vf_set(row->pdf_a),
+                         .radiance = rgb_all(row->radiance),
+                         .both_sides = vi_set(row->both_sides)};
 }
 
 static inline bool is_lamp(const struct light *light)
@@ -89,8 +94,8 @@ INLINE void finish_area_sample(const struct lamp *l, vec3v from, vec3v to, vec3v
     s->distance = vf_sqrt(d2);
     s->wi = scalev(w, 1 / s->distance);
     vf cosine = dotv(normal, s->wi), cos_l = vf_abs(cosine);
-    vi lit = l->both_sides ? vi_set(-1) : vf_lt(cosine, zero);
-    s->radiance = rgb_all(l->radiance);
+    vi lit = l->both_sides | vf_lt(cosine, zero);
+    s->radiance = l->radiance;
     /* Of d2 = 0 comes NaN, which no comparison lets through. */
     lit &= vf_lt(zero, cos_l);
     s->pdf_w = vf_select(lit, l->pdf_a * d2 / cos_l, zero);
@@ -123,18 +128,15 @@ INLINE void sample_lamp(const struct lamp *l, vec3v p, const vf u[4], struct lig
     sample_triangle(l, q, p, u, out);
 }
 
-/* The triangle of `count` within whose area the target lies. */
+/* The triangle of `count` within whose area the target lies, as discrete_pick(). */
 static inline int lamp_search(const float *record, int count, float target)
 {
-    int lo = 0, hi = count - 1;
-    while (lo < hi) {
-        int mid = lo + (hi - lo) / 2;
-        if (record[LAMP_WORDS * (size_t)mid + LAMP_AREA] > target)
-            hi = mid;
-        else
-            lo = mid + 1;
+    int at = 0;
+    for (int half; count > 1; count -= half) {
+        half = count / 2;
+        at += half & -(record[LAMP_WORDS * ((size_t)at + (size_t)half - 1) + LAMP_AREA] <= target);
     }
-    return lo;
+    return at;
 }
 
 /* Of many triangles; number: which. */
@@ -150,6 +152,32 @@ INLINE void sample_mesh(const struct lamp *l, vec3v p, const vf u[4], int32_t nu
     sample_triangle(l, q, p, u, out);
 }
 
+/* Samples of a light of each lane, which may be another's, for lanes of the mask whose lights are triangles without a
+ * texture; which these are. */
+INLINE unsigned sample_lamps(const struct light_table *t, const uint32_t light[LANES], vec3v p,
+                             const vf u[4], unsigned mask, struct light_samplev *out)
+{
+    int32_t row[LANES] = {0}, number[LANES] = {0};
+    vf w[COLUMNS], q[2 * COLUMNS];
+    for (unsigned m = mask; m; m &= m - 1)
+        row[__builtin_ctz(m)] = (int32_t)light[__builtin_ctz(m)];
+    gather_columns(&t->row->radiance.r, COLUMNS, row, w);
+    const vi first = as_vi(w[5]), count = as_vi(w[6]);
+    const vf target = u[2] * w[7];
+    mask &= bits(vi_lt(vi_set(0), count));
+    for (unsigned m = mask; m; m &= m - 1) {
+        const int i = __builtin_ctz(m), from = LANE(first, i);
+        number[i] = from + lamp_search(t->lamp + LAMP_WORDS * (size_t)from, LANE(count, i),
+                                       LANE(target, i));
+    }
+    for (int i = 0; i < 2; i++)
+        gather_columns(t->lamp + COLUMNS * i, LAMP_WORDS, number, q + COLUMNS * i);
+    const struct lamp lamp = {
+        .radiance = {w[0], w[1], w[2]}, .pdf_a = w[3], .both_sides = as_vi(w[4])};
+    sample_triangle(&lamp, q, p, u, out);
+    return mask;
+}
+
 /* Of triangles with a texture. */
 static __attribute__((noinline)) void sample_textured(const struct scene *s,
                                                       const struct light *light,
@@ -159,13 +187,14 @@ static __attribute__((noinline)) void sample_textured(const struct scene *s,
     int32_t number[LANES];
     vf b1, b2;
     const uint32_t map = s->materials[s->tri_material[light->first]].radiance_map;
+    const rgb radiance = s->materials[s->tri_material[light->first]].radiance;
     sample_mesh(l, p, u, number, out);
     warp_triangle(u[0], u[1], &b1, &b2);
     for (; mask; mask &= mask - 1) {
         int i = __builtin_ctz(mask);
         rgb texel =
             scene_map_at(s, map, light->first + (uint32_t)number[i], LANE(b1, i), LANE(b2, i));
-        rgb_set_lane(&out->radiance, i, rgb_mul(l->radiance, texel));
+        rgb_set_lane(&out->radiance, i, rgb_mul(radiance, texel));
         LANE(out->pdf_w, i) *=
             rgb_is_zero(texel) ? 0 : l->record[LAMP_WORDS * (size_t)number[i] + LAMP_WEIGHT];
     }
@@ -200,7 +229,7 @@ INLINE void sample_sphere(const struct scene *s, const struct light *light, cons
     /* Distance to the near side; at the rim rounding may make the root negative. */
     vf along = vf_sqrt(d2) * local.z;
     out->distance = along - vf_sqrt(vf_max(zero, r2 - d2 * (1 - local.z * local.z)));
-    out->radiance = rgb_all(l->radiance);
+    out->radiance = l->radiance;
     out->sphere = vi_set((int32_t)(s->num_triangles + light->first));
     out->pdf_w = warp_uniform_cone_pdf_w(one_minus_cos);
     if (!(mask & ~bits(cone)))
@@ -309,9 +338,9 @@ INLINE vf pdf_of_light(const struct light_table *t, const int32_t light[LANES],
         const struct light *l = &s->lights[light[i]];
         LANE(area, i) = l->area;
         if (l->textured)
-            LANE(area, i) /=
-                t->lamp[LAMP_WORDS * (size_t)(t->first[light[i]] + prim[i] - l->first) +
-                        LAMP_WEIGHT];
+            LANE(area, i) /= t->lamp[LAMP_WORDS * (size_t)((uint32_t)t->row[light[i]].first +
+                                                           prim[i] - l->first) +
+                                     LAMP_WEIGHT];
         if (l->kind == LIGHT_SPHERE && s->spheres[l->first].normal_out > 0) {
             round |= 1u << i;
             LANE(radius, i) = s->spheres[l->first].radius;

@@ -101,12 +101,12 @@ INLINE void load_lamp_sample(const struct batch *b, int j, const struct lamp *la
     ls->wi = v3_load(&b->shadow.d, LANES * j);
     ls->distance = vf_load_any(b->shadow.tmax + LANES * j);
     ls->pdf_w = vf_load_any(b->shadow.tmin + LANES * j);
-    ls->radiance = rgb_all(lamp->radiance);
+    ls->radiance = lamp->radiance;
     ls->sphere = vi_set(-1);
     ls->delta = vi_set(0);
 }
 
-/* Of the lights in b->choice, those of each light together. */
+/* Of the lights in b->choice: of lamps together, else those of each light. */
 static __attribute__((noinline)) void sample_chosen(const struct integrator *it,
                                                     const struct batch *b, int k, unsigned mask,
                                                     int j, struct light_samplev *out)
@@ -115,11 +115,13 @@ static __attribute__((noinline)) void sample_chosen(const struct integrator *it,
     const vec3v p = v3_load(&b->p, k), n = v3_load(&b->ns, k);
     vf u[4];
     load_numbers(b, j, u);
+    if (it->scene->starter == 0)
+        mask &= ~sample_lamps(it->lights, b->choice + k, p, u, mask, out);
     while (mask) {
         const uint32_t light = b->choice[k + __builtin_ctz(mask)];
-        const vi same = vi_eq(chosen, vi_set((int32_t)light));
+        const vi same = lanes_of(mask) & vi_eq(chosen, vi_set((int32_t)light));
         struct light_samplev one;
-        sample_light_from(it->lights, light, p, n, u, mask & bits(same), &one);
+        sample_light_from(it->lights, light, p, n, u, bits(same), &one);
         *out = light_sample_select(same, &one, out);
         mask &= ~bits(same);
     }
