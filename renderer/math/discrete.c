@@ -20,23 +20,3 @@ double discrete_build(const double *weight, uint32_t n, uint32_t *end)
     }
     return total;
 }
-
-uint32_t discrete_pick(const uint32_t *end, uint32_t n, float u)
-{
-    assert(end[n - 1] == DISCRETE_STEPS);
-    const uint32_t step = (uint32_t)(u * DISCRETE_STEPS), *at = end;
-    /* Without branches on what is found, which no machine can foresee. */
-    while (n > 1) {
-        const uint32_t half = n / 2;
-        at += half & -(uint32_t)(at[half - 1] <= step);
-        n -= half;
-    }
-    return (uint32_t)(at - end);
-}
-
-uint32_t discrete_pick_part(const uint32_t *end, uint32_t n, float u, float *part)
-{
-    const uint32_t i = discrete_pick(end, n, u), first = i > 0 ? end[i - 1] : 0;
-    *part = (u * DISCRETE_STEPS - (float)first + 0.5f) / (float)(end[i] - first);
-    return i;
-}

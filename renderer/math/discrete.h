@@ -8,6 +8,7 @@
 #ifndef ASSAY_DISCRETE_H
 #define ASSAY_DISCRETE_H
 
+#include <assert.h>
 #include <stdint.h>
 
 enum { DISCRETE_STEPS = 1 << 24, DISCRETE_MOST = 1 << 23 };
@@ -18,10 +19,26 @@ enum { DISCRETE_STEPS = 1 << 24, DISCRETE_MOST = 1 << 23 };
 double discrete_build(const double *weight, uint32_t n, uint32_t *end);
 
 /* u in [0, 1). Never a thing of weight 0. */
-uint32_t discrete_pick(const uint32_t *end, uint32_t n, float u);
+static inline uint32_t discrete_pick(const uint32_t *end, uint32_t n, float u)
+{
+    assert(end[n - 1] == DISCRETE_STEPS);
+    const uint32_t step = (uint32_t)(u * DISCRETE_STEPS), *at = end;
+    /* Without branches on what is found, which no machine can foresee. */
+    while (n > 1) {
+        const uint32_t half = n / 2;
+        at += half & -(uint32_t)(at[half - 1] <= step);
+        n -= half;
+    }
+    return (uint32_t)(at - end);
+}
 
 /* The same; *part, 0 to 1: where u lies among the steps of what is picked. */
-uint32_t discrete_pick_part(const uint32_t *end, uint32_t n, float u, float *part);
+static inline uint32_t discrete_pick_part(const uint32_t *end, uint32_t n, float u, float *part)
+{
+    const uint32_t i = discrete_pick(end, n, u), first = i > 0 ? end[i - 1] : 0;
+    *part = (u * DISCRETE_STEPS - (float)first + 0.5f) / (float)(end[i] - first);
+    return i;
+}
 
 static inline float discrete_probability(const uint32_t *end, uint32_t i)
 {
