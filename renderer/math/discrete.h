@@ -32,12 +32,11 @@ static inline uint32_t discrete_pick(const uint32_t *end, uint32_t n, float u)
     return (uint32_t)(at - end);
 }
 
-/* The same; *part, 0 to 1: where u lies among the steps of what is picked. */
-static inline uint32_t discrete_pick_part(const uint32_t *end, uint32_t n, float u, float *part)
+/* Where u lies among the steps of thing i, which is picked by it, 0 to 1. */
+static inline float discrete_part(const uint32_t *end, uint32_t i, float u)
 {
-    const uint32_t i = discrete_pick(end, n, u), first = i > 0 ? end[i - 1] : 0;
-    *part = (u * DISCRETE_STEPS - (float)first + 0.5f) / (float)(end[i] - first);
-    return i;
+    const uint32_t first = i > 0 ? end[i - 1] : 0;
+    return (u * DISCRETE_STEPS - (float)first + 0.5f) / (float)(end[i] - first);
 }
 
 static inline float discrete_probability(const uint32_t *end, uint32_t i)

@@ -111,22 +111,77 @@ static inline float cell_pdf_w(const struct environment *env, int32_t table, uin
            discrete_probability(env->column_end + (size_t)row * env->width + first, column - first);
 }
 
-/* Chooses a cell; where in it, 0 to 1, and the density: 0, if no light comes to that side. */
-static inline float pick_cell(const struct environment *env, int32_t table, const float u[4],
-                              uint32_t *row, uint32_t *column, float part[2])
+/* Choices of a cell, each by a number of the sampler: of the steps of count[i] things, from end[i] on, the thing. */
+struct picks {
+    const uint32_t *end[LANES];
+    uint32_t count[LANES], step[LANES], thing[LANES];
+};
+
+/* All choices a step of the search at a time, since the machine overlaps what does not wait for each other. */
+static inline void pick_each(struct picks *p, int num, const float *u)
 {
-    const uint32_t *end = sky_regions(env, table);
-    if (end[env->num_rows - 1] == 0)
-        return 0;
-    const uint32_t i = discrete_pick_part(end, env->num_rows, u[2], part);
-    const uint32_t j = discrete_pick_part(end + env->num_rows + i * env->num_columns,
-                                          env->num_columns, u[3], part + 1);
-    const uint32_t r = env->row_first[i], c = env->column_first[j];
-    *row = r + discrete_pick(env->row_end + (size_t)j * (env->height + 1) + r,
-                             env->row_first[i + 1] - r, u[0]);
-    *column = c + discrete_pick(env->column_end + (size_t)*row * env->width + c,
-                                env->column_first[j + 1] - c, u[1]);
-    return cell_pdf_w(env, table, *row, *column);
+    uint32_t most = 1;
+    for (int i = 0; i < num; i++) {
+        p->step[i] = (uint32_t)(u[i] * DISCRETE_STEPS);
+        p->thing[i] = 0;
+        most = p->count[i] > most ? p->count[i] : most;
+    }
+    for (; most > 1; most -= most / 2)
+        for (int i = 0; i < num; i++) {
+            const uint32_t half = p->count[i] / 2, last = half - (half > 0);
+            p->thing[i] += half & -(uint32_t)(p->end[i][p->thing[i] + last] <= p->step[i]);
+            p->count[i] -= half;
+        }
+}
+
+/* Choices of cells for the lanes of the mask; where in them, 0 to 1, and the density: 0, if no light comes to that side. */
+static inline void pick_cells(const struct environment *env, const int32_t table[LANES],
+                              const vf u[4], unsigned mask, int32_t row[LANES],
+                              int32_t column[LANES], float part[2][LANES], float pdf_w[LANES])
+{
+    int lane[LANES], num = 0;
+    float number[4][LANES];
+    uint32_t region[2][LANES];
+    struct picks p = {.count = {0}};
+    for (; mask; mask &= mask - 1) {
+        const int i = __builtin_ctz(mask);
+        const uint32_t *end = sky_regions(env, table[i]);
+        if (end[env->num_rows - 1] == 0)
+            continue;
+        for (int k = 0; k < 4; k++)
+            number[k][num] = LANE(u[k], i);
+        p.end[num] = end;
+        p.count[num] = env->num_rows;
+        lane[num++] = i;
+    }
+    for (int k = 0; k < 2; k++) {
+        pick_each(&p, num, number[2 + k]);
+        for (int i = 0; i < num; i++) {
+            part[k][lane[i]] = discrete_part(p.end[i], p.thing[i], number[2 + k][i]);
+            region[k][i] = p.thing[i];
+            p.end[i] += env->num_rows + p.thing[i] * env->num_columns;
+            p.count[i] = env->num_columns;
+        }
+    }
+    for (int i = 0; i < num; i++) {
+        const uint32_t *first = env->row_first + region[0][i];
+        p.end[i] = env->row_end + (size_t)region[1][i] * (env->height + 1) + *first;
+        p.count[i] = first[1] - *first;
+    }
+    pick_each(&p, num, number[0]);
+    for (int i = 0; i < num; i++) {
+        const uint32_t *first = env->column_first + region[1][i],
+                       r = env->row_first[region[0][i]] + p.thing[i];
+        row[lane[i]] = (int32_t)r;
+        p.end[i] = env->column_end + (size_t)r * env->width + *first;
+        p.count[i] = first[1] - *first;
+    }
+    pick_each(&p, num, number[1]);
+    for (int i = 0; i < num; i++) {
+        const int k = lane[i];
+        column[k] = (int32_t)(env->column_first[region[1][i]] + p.thing[i]);
+        pdf_w[k] = cell_pdf_w(env, table[k], (uint32_t)row[k], (uint32_t)column[k]);
+    }
 }
 
 INLINE void sample_sky(const struct environment *env, vec3v n, const vf u[4], unsigned mask,
@@ -135,18 +190,10 @@ INLINE void sample_sky(const struct environment *env, vec3v n, const vf u[4], un
     int32_t table[LANES], row[LANES] = {0}, column[LANES] = {0};
     float part[2][LANES] = {{0}}, begin[LANES] = {0}, growth[LANES] = {0}, pdf[LANES] = {0};
     vi_store_any(table, sky_table(n));
-    for (; mask; mask &= mask - 1) {
-        const int i = __builtin_ctz(mask);
-        const float numbers[4] = {LANE(u[0], i), LANE(u[1], i), LANE(u[2], i), LANE(u[3], i)};
-        uint32_t r = 0, c = 0;
-        float within[2] = {0, 0};
-        pdf[i] = pick_cell(env, table[i], numbers, &r, &c, within);
-        part[0][i] = within[0];
-        part[1][i] = within[1];
-        row[i] = (int32_t)r;
-        column[i] = (int32_t)c;
-        begin[i] = env->begin[r];
-        growth[i] = env->growth[r];
+    pick_cells(env, table, u, mask, row, column, part, pdf);
+    for (int i = 0; i < LANES; i++) {
+        begin[i] = env->begin[row[i]];
+        growth[i] = env->growth[row[i]];
     }
     const float width = (float)env->width, height = (float)env->height;
     struct skyplacev p = {
