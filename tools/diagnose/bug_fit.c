@@ -409,16 +409,19 @@ struct candidate bug_fit_at(const struct bug_fit *f, int bug, int second, double
 {
     struct candidate out = {.bug = bug, .second = second, .amplitude = amplitude};
     struct tally t = total(f, &out), none = {0};
-    const struct projection p = project(f, bug, second, -1);
     for (int k = 0; k < f->num_clues; k++)
         sum_up(&none, &f->correct[k]);
     out.log_likelihood =
         t.log_likelihood - none.log_likelihood - (amplitude != 1 ? amplitude_cost : 0);
     out.explained = t.all > 0 ? 1 - fmax(t.left, 0) / t.all : NAN;
     out.excess = (t.chi2 - t.chi2_mean) / sqrt(2 * t.cells);
-    out.strength = strength_of(&p);
-    out.t = p.norm > 0 ? p.along / sqrt(p.norm) : 0;
     return out;
+}
+
+double bug_fit_t(const struct bug_fit *f, const struct candidate *c)
+{
+    const struct projection p = project(f, c->bug, c->second, -1);
+    return p.norm > 0 ? p.along / sqrt(p.norm) : 0;
 }
 
 double bug_fit_worst(const struct bug_fit *f, const struct candidate *c, int *clue)

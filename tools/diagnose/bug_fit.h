@@ -41,6 +41,8 @@ const struct effect *bug_fit_effect(const struct view *v, int bug, int second, b
 
 /* The hypothesis at this strength of its effect. */
 struct candidate bug_fit_at(const struct bug_fit *f, int bug, int second, double amplitude);
+/* The directed statistic over all views. */
+double bug_fit_t(const struct bug_fit *f, const struct candidate *c);
 /* The strength that fits best: least squares with the weights of "correct"; refined to the largest likelihood from there. */
 double bug_fit_amplitude(const struct bug_fit *f, int bug);
 double bug_fit_refine(const struct bug_fit *f, int bug, double at);

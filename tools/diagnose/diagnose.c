@@ -284,6 +284,7 @@ static void name(const struct bug_fit *f, const struct diagnose_options *opt,
         if (!is_among(f->c, out, out->num_candidates, &all[i]))
             out->candidate[out->num_candidates++] = all[i];
     out->finding = FINDING_UNKNOWN;
+    out->t = num > 0 ? bug_fit_t(f, best) : 0;
     if (num == 0 || best->log_likelihood < bound ||
         (!is_explanation(f, opt, best) &&
          !is_nearly_all(f, opt, best, out->num_candidates > 1 ? &next[1] : NULL)))

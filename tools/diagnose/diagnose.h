@@ -35,7 +35,6 @@ struct candidate {
     double
         explained; /* share of what is clear of the difference from the correct renderer, at most 1; NAN if nothing is */
     double excess; /* chi^2 of what is left over its mean, in its standard deviations */
-    double t, strength; /* directed statistic over all views; the factor by least squares */
 };
 
 /* How a bug explains one view. */
@@ -53,6 +52,7 @@ struct diagnosis {
     double log10_p; /* of the most telling test, times the number of tests */
     struct candidate candidate[DIAGNOSE_CANDIDATES]; /* most likely first; none if CORRECT */
     int num_candidates;
+    double t;            /* directed statistic of the first over all views */
     double largest_lead; /* of any bug at full strength over "correct", natural logarithm */
     double
         log_likelihood; /* of "correct": to hold catalogues of the same cells against each other */

@@ -54,7 +54,7 @@ static void print_bugs(FILE *f, const struct catalogue *c, const struct diagnosi
     fprintf(f, "  probability %.4g among %d known bugs; ", d->probability, c->num_bugs);
     if (isnan(best->explained))
         fprintf(f, "no view is clear by itself, all together show it by %.0f standard deviations",
-                best->t);
+                d->t);
     else
         fprintf(f, "explains %.1f %% of the difference", 100 * best->explained);
     if (d->num_candidates > d->num_named) {
