@@ -7,6 +7,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <poll.h>
+#include <sched.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -81,10 +82,19 @@ static _Noreturn void guard_main(pid_t parent)
     _exit(1);
 }
 
-/* From fork to exec; `status` receives errno if that fails. */
-static _Noreturn void child_main(const struct process *p, const char *path, pid_t group, int out,
-                                 int status)
+/* What a child is to become; `status` receives errno if that fails. */
+struct child {
+    const struct process *p;
+    const char *path;
+    pid_t group;
+    int out, status;
+};
+
+/* Until exec. It may be in our memory, where sanitizers would remember frames that do not return. */
+__attribute__((no_sanitize("address"), no_sanitize("thread"))) static int child_main(void *arg)
 {
+    const struct child *c = arg;
+    const struct process *p = c->p;
     static const int reset[] = {SIGINT, SIGQUIT, SIGTERM, SIGHUP, SIGPIPE, SIGCHLD, SIGUSR1};
     for (size_t i = 0; i < sizeof reset / sizeof *reset; i++)
         signal(reset[i], SIG_DFL);
@@ -92,25 +102,29 @@ static _Noreturn void child_main(const struct process *p, const char *path, pid_
     sigemptyset(&none);
     sigprocmask(SIG_SETMASK, &none, NULL);
     /* Above 2 first: the parent may have been started with closed standard files. */
-    status = fcntl(status, F_DUPFD_CLOEXEC, 3);
-    out = fcntl(out, F_DUPFD_CLOEXEC, 3);
+    const int status = fcntl(c->status, F_DUPFD_CLOEXEC, 3),
+              out = fcntl(c->out, F_DUPFD_CLOEXEC, 3);
     int null = fcntl(open("/dev/null", O_RDONLY | O_CLOEXEC), F_DUPFD_CLOEXEC, 3);
-    if (setpgid(0, group) == 0 && dup2(null, 0) >= 0 && dup2(out, 1) >= 0 && dup2(out, 2) >= 0 &&
+    if (setpgid(0, c->group) == 0 && dup2(null, 0) >= 0 && dup2(out, 1) >= 0 && dup2(out, 2) >= 0 &&
         (p->cwd == NULL || chdir(p->cwd) == 0) && (p->before == NULL || p->before(p->before_ctx)))
-        execv(path, (char *const *)p->argv);
+        execv(c->path, (char *const *)p->argv);
     int saved = errno;
     ssize_t ignored = write(status, &saved, sizeof saved);
     (void)ignored;
     _exit(127);
 }
 
-/* fork() that does not let a signal handler of ours run in the child. */
-static pid_t fork_blocked(void)
+/* fork() that does not let a signal handler of ours run in the child, which has a copy of our memory; or, with `c`, our memory
+ * itself until it is that program: a copy takes longer the more we have. What is called before might change more than memory. */
+static pid_t fork_blocked(struct child *c)
 {
+    _Alignas(64) char stack[1 << 16];
     sigset_t all, old;
     sigfillset(&all);
     pthread_sigmask(SIG_SETMASK, &all, &old);
-    pid_t pid = fork();
+    pid_t pid = c == NULL ? fork()
+                          : clone(child_main, stack + sizeof stack,
+                                  SIGCHLD | (c->p->before == NULL ? CLONE_VM | CLONE_VFORK : 0), c);
     if (pid != 0)
         pthread_sigmask(SIG_SETMASK, &old, NULL);
     return pid;
@@ -248,7 +262,7 @@ static bool start(const struct process *p, const char *path, struct run *r, stru
 {
     int out[2] = {-1, -1}, status[2] = {-1, -1};
     pid_t parent = getpid();
-    r->guard = fork_blocked();
+    r->guard = fork_blocked(NULL);
     if (r->guard == 0)
         guard_main(parent);
     if (r->guard < 0)
@@ -258,9 +272,7 @@ static bool start(const struct process *p, const char *path, struct run *r, stru
         err_set(e, "%s: cannot make a pipe: %s", p->argv[0], strerror(errno));
         goto fail;
     }
-    r->child = fork_blocked();
-    if (r->child == 0)
-        child_main(p, path, r->guard, out[1], status[1]);
+    r->child = fork_blocked(&(struct child){p, path, r->guard, out[1], status[1]});
     if (r->child < 0) {
         err_set(e, "%s: cannot fork: %s", p->argv[0], strerror(errno));
         goto fail;
