@@ -1,7 +1,5 @@
 #include "carried.h"
 
-#include "rate_image.h"
-#include "stopping_rule.h"
 #include "tools/base/text.h"
 #include "tools/diagnose/bug_fit.h"
 #include "tools/stats/distributions.h"
@@ -262,32 +260,6 @@ static double share_off(const struct cells *s)
     return lit > 0 ? (double)off / lit : 1;
 }
 
-/* As the check itself, but of the number of samples that the rule takes with the light and the noise that the bugs leave. */
-static bool judge_rates(const struct carry *w, const struct rubric_check *c, struct result *out)
-{
-    int image = c->images[0];
-    const struct rubric_image *p = &w->g->r->image[image];
-    struct stopping by[NUM_STOPPING_KINDS];
-    struct rate_image rates;
-    struct err why; /* which has been said */
-    if (w->g->h->made[image].rates[0] == '\0' ||
-        !rate_image_read(w->g->h->made[image].rates, p->width, p->height, p->spp, c->batch,
-                         answer_key_counts(w->g->a, w->with, image)->n, &rates, &why) ||
-        !stopping_rule_samples(p, &w->g->h->image[image], answer_key_image(w->g->a, w->with, image),
-                               by, &why))
-        return true;
-    double least = by[STOPS_RIGHTLY].least, most = by[STOPS_RIGHTLY].most,
-           odd = rates.odd / fmax(1, rates.pixels),
-           half = stats_normal_quantile(w->g->alpha / 2) * rates.sd;
-    const struct interval count = {rates.mean / sqrt(least * most) - 1,
-                                   rates.mean / most - 1 - half, rates.mean / least - 1 + half,
-                                   rates.sd},
-                          share = {odd, odd, odd, 0};
-    out->share = fmin(score_share(&c->share, &share), score_share(&c->count, &count));
-    out->chance = score_chance(&c->count, &count);
-    return true;
-}
-
 /* *is_judged: false where this kind, or an image without a view, is left as it is. */
 static bool judge(const struct carry *w, const struct rubric_check *c, int bugs, struct result *out,
                   bool *is_judged, struct err *e)
@@ -301,7 +273,8 @@ static bool judge(const struct carry *w, const struct rubric_check *c, int bugs,
         *is_judged = *is_judged && rubric_bugs_can_observe(w->g, w->with, c->images[k]);
     if (ok && *is_judged && c->kind == CHECK_RATES) {
         free(cells);
-        return judge_rates(w, c, out);
+        grade_checks_rates(w->g, w->with, c, out);
+        return true;
     }
     for (int k = 0; ok && *is_judged && k < images; k++)
         ok = add_image(w, c->images[k], k == 0 ? 1 : -1, bugs, cells, e);

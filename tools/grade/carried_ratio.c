@@ -286,7 +286,7 @@ static bool is_drawn(const struct rubric *r, const struct rubric_check *c,
     return false;
 }
 
-/* How many samples a wrong image takes differs a little from a right one. */
+/* How many samples a wrong image takes differs a little from a right one, or is what the rule takes with its light and noise. */
 static bool carry_rates(const struct grading *g, int set, const struct rubric_check *c,
                         struct result *out, struct err *e)
 {
@@ -304,6 +304,16 @@ static bool carry_rates(const struct grading *g, int set, const struct rubric_ch
     const struct interval count = {v, v, v, 0}, share = {odd, odd, odd, 0};
     const struct margin m = margin_of(&c->carried, rates.mean / (1 + rates.more) / p->spp);
     double better = fmin(score_share(&m, &count), score_share(&c->share, &share));
+    struct result own = {0};
+    grade_checks_rates(g, set, c, &own);
+    if (own.share > fmax(better, out->share)) {
+        out->share = own.share;
+        out->chance = own.chance;
+        snprintf(
+            out->carried, sizeof out->carried,
+            "an earlier part lost points in this scene: the rule takes as many samples with the light and noise of the program's own image");
+        return true;
+    }
     if (better <= out->share)
         return true;
     out->share = better;

@@ -11,7 +11,8 @@
  * is direct light, P has the factor B'/B at every bounce (a wrong BSDF), or as B (wrong light), whichever is nearer. An image that is
  * the other one again, or what that should be of fewer bounces (its direct light may depend on -l), or does not look like what it should show (where there is something to
  * see, or no other image of the scene is right), carries nothing on.
- * `rates` of a scene of which an earlier part lost points: the logarithm of the number of samples over ours against that margin.
+ * `rates` of a scene of which an earlier part lost points: the logarithm of the number of samples over ours against that margin, or
+ * grade_checks_rates(), whichever is more.
  * `noise`: against another image of the program's own with more samples, instead of the right one. False: out of memory. */
 bool carried_by_ratio(const struct grading *g, int set, const double *share, const bool *paid,
                       struct result *result, struct err *e);

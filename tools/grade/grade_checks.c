@@ -542,6 +542,31 @@ static bool check_rates(struct work *w, struct result *out, struct err *e)
     return true;
 }
 
+void grade_checks_rates(const struct grading *g, int set, const struct rubric_check *c,
+                        struct result *out)
+{
+    int image = c->images[0];
+    const struct rubric_image *p = &g->r->image[image];
+    struct stopping by[NUM_STOPPING_KINDS];
+    struct rate_image rates;
+    struct err why; /* which has been said */
+    if (g->h->made[image].rates[0] == '\0' ||
+        !rate_image_read(g->h->made[image].rates, p->width, p->height, p->spp, c->batch,
+                         answer_key_counts(g->a, set, image)->n, &rates, &why) ||
+        !stopping_rule_samples(p, &g->h->image[image], answer_key_image(g->a, set, image), by,
+                               &why))
+        return;
+    double least = by[STOPS_RIGHTLY].least, most = by[STOPS_RIGHTLY].most,
+           odd = rates.odd / fmax(1, rates.pixels),
+           half = stats_normal_quantile(g->alpha / 2) * rates.sd;
+    const struct interval count = {rates.mean / sqrt(least * most) - 1,
+                                   rates.mean / most - 1 - half, rates.mean / least - 1 + half,
+                                   rates.sd},
+                          share = {odd, odd, odd, 0};
+    out->share = fmin(score_share(&c->share, &share), score_share(&c->count, &count));
+    out->chance = score_chance(&c->count, &count);
+}
+
 /* What a run may take longer or shorter than another of the same work. */
 static double timing_error(const struct made *m)
 {

@@ -111,6 +111,11 @@ NODISCARD bool grade_checks_run(const struct grading *g, const struct rubric_che
  * and few samples, so that reading the scene and building the hierarchy cancel. Judged at the end of the interval that is best for the program. */
 void grade_checks_growth(const struct grading *g, const struct rubric_check *c, struct result *out);
 
+/* `rates` as the check itself, but of the number of samples that the rule takes with the light and the noise of the program's
+ * own image; what cannot be told is left as it is. */
+void grade_checks_rates(const struct grading *g, int set, const struct rubric_check *c,
+                        struct result *out);
+
 /* All checks, out[0 .. num_checks-1], against the set of deviations that leaves the most points: the empty one unless
  * another brings 1 % of all points more and some image that is wrong without it is right with it, and not for its noise: a bug that
  * looks a little like it is not taken for it. What a program does wrong besides still costs. On failure there
