@@ -131,9 +131,12 @@ static bool fold_runs(struct engine_job *j, struct moments *m, struct err *e)
             break;
         replicate_repeats_add(&repeats, px, pixels);
         if (j->en->output == OUTPUT_MEAN && repeats.same >= 0 && !repeats.without_noise)
-            ok = err_set(e,
-                         "replicate %d is the same image as an earlier one: the seed has no effect",
-                         repeats.same);
+            ok = err_set(
+                e, "replicate %d is the same image as an earlier one: the seed has no effect%s",
+                repeats.same,
+                strcmp(j->en->image, "hdr") == 0
+                    ? ", or less than RGBE's 8 bits show: write EXR or PFM"
+                    : "");
         moments_add_image(m, px);
         if (check)
             replicates_add(&seen, px);

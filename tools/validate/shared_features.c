@@ -135,21 +135,21 @@ static void tell(const struct traits *t, FILE *to)
 {
     struct place best[MOST_KEPT];
     find_places(t, best);
-    if (best[0].bits == 0 && t->num_differ == t->num_claims)
+    const bool is_few = num_scenes(t) < FEW_SCENES;
+    if (best[0].bits == 0 && t->num_differ == t->num_claims && !is_few)
         fprintf(
             to,
             "Every claim differs, all %d: look at what all scenes need, such as the camera, the "
             "loader, the film.",
             t->num_claims);
-    else if (best[0].bits == 0 && num_scenes(t) < FEW_SCENES)
-        fprintf(to,
-                "%d claims differ and %d agree; what those have in common shows in more scenes.",
-                t->num_differ, t->num_claims - t->num_differ);
+    else if (best[0].bits == 0 && is_few)
+        fprintf(to, "%d of %d claims differ; what these have in common shows in more scenes.",
+                t->num_differ, t->num_claims);
     else if (best[0].bits == 0)
         fprintf(
             to,
-            "The %d claims that differ have nothing in common that the %d that agree lack: look at "
-            "what all scenes need, such as the camera, the loader, the film.",
+            "The %d claims that differ have nothing in common that the %d that agree lack: several "
+            "mistakes, or one in what all scenes need (camera, loader, film). Begin with the first.",
             t->num_differ, t->num_claims - t->num_differ);
     if (best[0].bits == 0) {
         name_scenes(t, to);
