@@ -1,6 +1,6 @@
 #include "bvh.h"
 #include "bvh_internal.h"
-#include "bvh_wide.h"
+#include "small_scene.h"
 #include "traverse.h"
 #include "renderer/scene/shape.h"
 
@@ -103,7 +103,8 @@ uint32_t bvh_num_nodes(const struct bvh *t)
 size_t bvh_size(const struct bvh *t)
 {
     if (t->wide != NULL)
-        return sizeof *t + sizeof *t->wide + t->wide->used;
+        return sizeof *t + sizeof *t->wide + t->wide->used +
+               (t->wide->flat != NULL ? sizeof *t->wide->flat : 0);
     return sizeof *t + t->num_nodes * sizeof *t->nodes +
            t->num_primitives * (sizeof *t->order + sizeof *t->triangles);
 }

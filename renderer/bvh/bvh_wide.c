@@ -195,26 +195,24 @@ static bool add_tree(struct build *b, const struct wide_range *all)
            add_node(b, 0, 0);
 }
 
-static bool add_list(struct build *b, struct wide_range *all)
+/* Of `num` primitives. False if out of memory. */
+static bool add_list(struct build *b, const uint32_t *prim, uint32_t num)
+{
+    struct wide *w = b->w;
+    if ((w->flat = malloc(sizeof *w->flat)) == NULL)
+        return false;
+    small_scene_fill(b->scene, prim, (int)num, w->flat);
+    w->num_list_leaves = (num + WIDTH - 1) / WIDTH;
+    w->cost = w->num_list_leaves;
+    return true;
+}
+
+static bool add_all_as_list(struct build *b, uint32_t num)
 {
     uint32_t prim[WIDE_FLAT];
-    for (uint32_t i = 0; i < all->count; i++)
+    for (uint32_t i = 0; i < num; i++)
         prim[i] = i;
-    if ((b->w->flat = malloc(sizeof *b->w->flat)) == NULL)
-        return false;
-    small_scene_fill(b->scene, prim, (int)all->count, b->w->flat);
-    uint32_t triangles = b->scene->num_triangles;
-    for (uint32_t i = 0; i < all->count;) {
-        uint32_t end = i < triangles ? triangles : all->count;
-        struct wide_range r = {.first = i, .count = end - i < WIDTH ? end - i : WIDTH};
-        if (add_leaf(b, &r) == WIDE_PLACE)
-            return false;
-        b->w->num_sphere_leaves += i >= triangles;
-        i += r.count;
-    }
-    b->w->num_list_leaves = b->w->num_leaves;
-    b->w->cost = b->w->num_leaves;
-    return true;
+    return add_list(b, prim, num);
 }
 
 /* The walls of a room would be in every ray's way down the tree. Takes them out of `all`: primitives that
@@ -243,20 +241,18 @@ static bool take_large(struct build *b, struct wide_range *all)
     }
     if (num == 0)
         return true;
-    if ((w->flat = malloc(sizeof *w->flat)) == NULL)
+    if (!add_list(b, prim, num))
         return false;
-    small_scene_fill(b->scene, prim, (int)num, w->flat);
     if (!w->flat->quick) {
         free(w->flat);
         w->flat = NULL;
+        w->cost = 0;
         return true;
     }
     uint32_t to = all->count;
     for (uint32_t i = all->count; i-- > 0;)
         if (!is_large(b, &b->item[i]))
             b->item[--to] = b->item[i];
-    w->num_list_leaves = (num + WIDTH - 1) / WIDTH;
-    w->cost += w->num_list_leaves;
     all->first = num;
     all->count -= num;
     b->splitter->bounds(b->item + num, all->count, &all->box, &all->centres);
@@ -296,7 +292,8 @@ struct wide *wide_build(const struct scene *s, enum isa isa, int threads, struct
         w->min[a] = all.box.v[a];
         w->max[a] = -all.box.v[4 + a];
     }
-    if (!(all.count <= WIDE_FLAT ? add_list(&b, &all) : take_large(&b, &all) && add_tree(&b, &all)))
+    if (!(all.count <= WIDE_FLAT ? add_all_as_list(&b, all.count)
+                                 : take_large(&b, &all) && add_tree(&b, &all)))
         goto fail;
     for (int a = 0; a < 3; a++) {
         w->tree_min[a] = all.box.v[a];

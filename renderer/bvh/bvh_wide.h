@@ -39,7 +39,7 @@ struct small_scene_trace;
 
 struct wide {
     struct small_scene *flat; /* the list; NULL: there is none */
-    char *arena;              /* nodes and leaves; at 0 the root, or the leaves of a list */
+    char *arena;              /* nodes and leaves; at 0 the root */
     size_t used;              /* bytes */
     const struct traverse *kernel;
     const struct small_scene_trace *list; /* its kernel */
@@ -47,7 +47,6 @@ struct wide {
     float tree_min[3], tree_max[3];       /* of what is in the tree */
     uint32_t num_list_leaves;             /* what the list counts as in tests */
     uint32_t num_nodes, num_leaves;       /* num_nodes 0: a list */
-    uint32_t num_sphere_leaves;           /* of a list: the last ones */
     uint32_t num_triangles; /* of the scene: sphere i is primitive num_triangles + i */
     int depth;
     bool in_turns; /* rays go through the tree in turns, since it is larger than the cache */
