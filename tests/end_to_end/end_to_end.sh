@@ -692,6 +692,12 @@ for case in "1.002 0 nothing wrong found" "1.02 1 none of the"; do
     "$assay" validate -q --only 12_point_plane --engine "$tmp/scaled.json" --out "$tmp/scaled" >"$tmp/out" 2>&1
     expect "diagnose: an engine whose images are $scale times ours" "$code" "$words" "$assay" diagnose "$tmp/scaled/results.json"
 done
+# Nor of a pixel filter that it declares, at the edge of a cone of light.
+sed "s|^exec pathtracer|exec $pathtracer --filter gauss:0.5:2|" reference/engines/mine.sh >"$tmp/scaled.sh"
+sed "s|{here}/mine.sh|$tmp/scaled.sh|; s|\"point\"|&, \"spot\", \"falloff\"|; s|\"spp\": 32, \"replicates\": 64|\"spp\": 64, \"replicates\": 16, \"filter\": \"gauss:0.5:2\", \"shared_samples\": false|" \
+    reference/engines/mine.json >"$tmp/scaled.json"
+"$assay" validate -q --only 38_spot_edge/mine:pathtracer --engine "$tmp/scaled.json" --out "$tmp/scaled" >"$tmp/out" 2>&1
+expect "diagnose: an engine with a pixel filter" 0 "nothing wrong found" "$assay" diagnose "$tmp/scaled/results.json"
 plane="$pathtracer -q -m 1 -s 64 reference/scenes/12_point_plane.dae"
 $plane -r 48 48 -f "$tmp/plane.exr" >"$tmp/out" && $plane -r 40 40 -f "$tmp/odd.exr" >"$tmp/out"
 expect "diagnose: one image, larger than the catalogue's" 0 "nothing wrong found" \

@@ -105,27 +105,57 @@ static const char *subject_of(const json_t *results)
     return ours;
 }
 
-/* The path of the image that claims of this scene and engine were judged by, and the widest margin of one. */
-static bool find_image(const json_t *results, const char *json_path, const struct view *v,
-                       const char *subject, char *path, double *margin)
+/* Of a claim's side, from the folder of results.json. */
+static bool file_of(const json_t *claim, const char *side, const char *json_path, char *path)
 {
-    bool found = false;
-    *margin = 0;
+    const char *file = member_text(json_object_get(claim, "files"), side);
+    if (file == NULL)
+        return false;
+    const char *slash = strrchr(json_path, '/');
+    int stem = file[0] == '/' || slash == NULL ? 0 : (int)(slash - json_path) + 1;
+    return snprintf(path, MAX_PATH, "%.*s%s", stem, json_path, file) < MAX_PATH;
+}
+
+/* What claims of this scene and engine were judged by. */
+struct judged_by {
+    char image[MAX_PATH], of_ours[MAX_PATH]; /* "": none; ours has the engine's pixel filter */
+    double margin;                           /* the widest */
+};
+
+static struct judged_by find_judged(const json_t *results, const char *json_path,
+                                    const struct view *v, const char *subject)
+{
+    struct judged_by out = {0};
     const char *engine = v->variant[0] == '\0'        ? subject
                          : strcmp(subject, ours) == 0 ? v->variant
                                                       : "";
     json_each(claim, json_object_get(results, "claims")) {
-        const char *file = member_text(json_object_get(claim, "files"), "a");
-        if (file == NULL || v->options[0] != NULL ||
-            strcmp(member_text(claim, "scene"), v->scene) != 0 ||
-            strcmp(member_text(claim, "a"), engine) != 0)
+        if (v->options[0] != NULL || strcmp(member_text(claim, "scene"), v->scene) != 0 ||
+            strcmp(member_text(claim, "a"), engine) != 0 ||
+            !file_of(claim, "a", json_path, out.image))
             continue;
-        const char *slash = strrchr(json_path, '/');
-        int stem = file[0] == '/' || slash == NULL ? 0 : (int)(slash - json_path) + 1;
-        found = snprintf(path, MAX_PATH, "%.*s%s", stem, json_path, file) < MAX_PATH;
-        *margin = fmax(*margin, member_number(claim, "margin_global"));
+        out.margin = fmax(out.margin, member_number(claim, "margin_global"));
+        if (strcmp(member_text(claim, "b"), ours) == 0 &&
+            !file_of(claim, "b", json_path, out.of_ours))
+            out.of_ours[0] = '\0';
     }
-    return found;
+    return out;
+}
+
+/* The catalogue is of the box of one pixel: of an image with another filter, by how much it differs from ours with that. */
+static bool take_filter_off(const char *of_ours, struct observation *clue, struct err *e)
+{
+    struct observation right;
+    if (of_ours[0] == '\0')
+        return err_set(e, "no image of ours with its pixel filter");
+    if (!read_image(clue->view, of_ours, 0, false, &right, e))
+        return false;
+    for (int i = 0; i < 3 * clue->seen.columns * clue->seen.rows; i++) {
+        clue->seen.mean[i] =
+            fmax(0, clue->seen.mean[i] + clue->view->correct.mean[i] - right.seen.mean[i]);
+        clue->seen.var[i] += right.seen.var[i];
+    }
+    return true;
 }
 
 static void add_consistency(const json_t *results, struct observation *clue)
@@ -160,18 +190,22 @@ bool diagnose_gather_results(const struct diagnose_gather_options *opt, const ch
         const struct suite_scene *scene;
         const struct suite_variant *variant;
         struct err why = {""};
-        char image[MAX_PATH];
-        double margin;
         ok = catalogue_view_scene(v, opt->suite, &scene, &variant, e);
         if (!ok)
             break;
-        bool there =
-            find_image(results, path, v, subject, image, &margin) || err_set(&why, "no image");
-        if (there && read_image(v, image, is_ours ? v->spp : 0, is_ours, &clue[*num], &why)) {
+        const struct judged_by judged = find_judged(results, path, v, subject);
+        bool there = judged.image[0] != '\0' || err_set(&why, "no image");
+        there = there && (is_ours || scene->convention[0] == '\0' ||
+                          err_set(&why, "a convention may differ: %s", scene->convention));
+        there =
+            there && read_image(v, judged.image, is_ours ? v->spp : 0, is_ours, &clue[*num], &why);
+        if (there && json_object_get(results, "engine_filter") != NULL)
+            there = take_filter_off(judged.of_ours, &clue[*num], &why);
+        if (there) {
             if (is_ours)
                 add_consistency(results, &clue[*num]);
             else
-                allow_conventions(margin, &clue[*num]);
+                allow_conventions(judged.margin, &clue[*num]);
             ++*num;
         } else {
             json_array_append_new(skipped,
