@@ -357,6 +357,15 @@ static bool moved(const struct submitted_image *q, const struct moments *to,
     return ok;
 }
 
+/* To what its codes tell. */
+static bool is_black(const struct submitted_image *s)
+{
+    for (size_t i = 0; i < 3 * (size_t)s->width * (size_t)s->height; i++)
+        if (s->mean[i] > s->tolerance[i])
+            return false;
+    return true;
+}
+
 static bool check_agree(struct work *w, struct result *out, struct err *e)
 {
     const struct moments *m = reference(w, 0), *n = reference(w, 1);
@@ -367,8 +376,11 @@ static bool check_agree(struct work *w, struct result *out, struct err *e)
              deviates ? "differ as in our renders with the same deviation" : "have the same mean",
              100 * w->check->image.full, 100 * w->check->tile.full);
     if (strcmp(student(w, 0)->sha256, student(w, 1)->sha256) == 0) {
-        snprintf(out->seen, sizeof out->seen,
-                 "the two files are the same: the option that tells them apart has no effect");
+        snprintf(
+            out->seen, sizeof out->seen, "%s",
+            is_black(student(w, 0))
+                ? "both images are black"
+                : "the two files are the same: the option that tells them apart has no effect");
         return true;
     }
     return find_usable(w, out, e) && (!deviates || moved(student(w, 1), m, n, &w->compare[0], e)) &&

@@ -555,6 +555,12 @@ TEST(two_estimators_agree_or_not)
                  1, 1);
     expect_share(
         check(CHECK_AGREE, 2, (const struct bug *const[]){&none, &bright}, spp, NULL, 1e-5), 0, 0);
+    /* Of two black images, which are the same file, no option is to blame. */
+    const struct bug black = {.scale = 0, .square = 1, .noise = 1};
+    struct result r =
+        check(CHECK_AGREE, 2, (const struct bug *const[]){&black, &black}, spp, NULL, 1e-5);
+    assert_string_equal(r.seen, "both images are black");
+    expect_share(r, 0, 0);
 }
 
 /* A third and two thirds; the lamp in all of them is saturated and says nothing. */
