@@ -25,9 +25,9 @@ struct rayv {
 /* a[lane[0]], a[lane[1]], ... */
 INLINE vf gather(const float *a, const uint16_t *lane, bool in_row)
 {
-    vf v;
     if (in_row)
         return vf_load_any(a + lane[0]);
+    vf v = vf_set(0);
     for (int i = 0; i < LANES; i++)
         v[i] = a[lane[i]];
     return v;

@@ -17,7 +17,7 @@ INLINE void trace(const struct wide *w, const struct rays *r, const uint16_t *la
         rayv_init(r, eight, o);
         if (any)
             rayv_ignore(r, eight, o);
-        else if (w->flat != NULL)
+        else if (h != NULL && w->flat != NULL)
             rayv_go_on(h, eight, o);
         rayv_slabs(w, o);
         if (full && are_alike(w, o)) {

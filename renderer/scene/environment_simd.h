@@ -139,8 +139,8 @@ static inline void pick_cells(const struct environment *env, const int32_t table
                               const vf u[4], unsigned mask, int32_t row[LANES],
                               int32_t column[LANES], float part[2][LANES], float pdf_w[LANES])
 {
-    int lane[LANES], num = 0;
-    float number[4][LANES];
+    int lane[LANES] = {0}, num = 0;
+    float number[4][LANES] = {{0}};
     uint32_t region[2][LANES];
     struct picks p = {.count = {0}};
     for (; mask; mask &= mask - 1) {
