@@ -21,8 +21,8 @@ VERSION := 0.1
 COMMIT  := $(shell git rev-parse --short=12 HEAD 2>/dev/null || echo unknown)
 PKGS    := libxml-2.0 OpenEXR libpng jansson gsl nettle zlib libdeflate
 
-# Expanded when a recipe runs, so that pkg-config is asked after the packages are there.
-pkg_cflags = $(shell pkg-config --cflags $(PKGS) | sed 's/-I/-isystem /g')
+# Expanded when the first recipe runs, so that pkg-config is asked after the packages are there, and once.
+pkg_cflags = $(eval pkg_cflags := $$(shell pkg-config --cflags $$(PKGS) | sed 's/-I/-isystem /g'))$(pkg_cflags)
 # --as-needed: pathtracer starts at once, without the libraries that only the harness uses.
 LIBS       = -Wl,--as-needed $(shell pkg-config --libs $(PKGS)) -lm -pthread
 
