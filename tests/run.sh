@@ -9,6 +9,8 @@ passed=0 failed=0 skipped=0
 log=$build/check
 rm -rf "$log"
 mkdir -p "$log"
+# Blender's own scripts take half a second to compile at each start, where nothing may be written beside them.
+export PYTHONPYCACHEPREFIX=$(realpath "$log")/python PYTHONDONTWRITEBYTECODE=
 
 # run_job LOG NAME COMMAND...: its output, exit status and CPU seconds into files, so that jobs may run side by side.
 run_job() {

@@ -661,7 +661,7 @@ expect "golden: unknown" 3 "none of render" $golden forget
 # diagnose: names a bug, and none where there is none.
 expect "diagnose: help lists the views" 0 "12_point_plane" "$san_assay" diagnose --help
 expect "diagnose: the correct renderer" 0 "nothing wrong found" "$assay" diagnose --seed 5
-if tests/mutants/mutants.sh --build-only "$plain" point_light_linear seed_ignored variance_halved; then
+if tests/mutants/mutants.sh --quick --build-only "$plain" point_light_linear seed_ignored variance_halved; then
     ok "bugs can be built"
 else
     not_ok "bugs can be built" "see $build/mutants"
