@@ -90,8 +90,8 @@ struct child {
     int out, status;
 };
 
-/* Until exec. It may be in our memory, where sanitizers would remember frames that do not return. */
-__attribute__((no_sanitize("address"), no_sanitize("thread"))) static int child_main(void *arg)
+/* Until exec. It may be in our memory, where AddressSanitizer would remember frames that do not return. */
+__attribute__((no_sanitize("address"))) static int child_main(void *arg)
 {
     const struct child *c = arg;
     const struct process *p = c->p;
@@ -114,6 +114,13 @@ __attribute__((no_sanitize("address"), no_sanitize("thread"))) static int child_
     _exit(127);
 }
 
+/* ThreadSanitizer would take what a child does in our memory for our own. */
+#ifdef __SANITIZE_THREAD__
+#define IN_OUR_MEMORY 0
+#else
+#define IN_OUR_MEMORY (CLONE_VM | CLONE_VFORK)
+#endif
+
 /* fork() that does not let a signal handler of ours run in the child, which has a copy of our memory; or, with `c`, our memory
  * itself until it is that program: a copy takes longer the more we have. What is called before might change more than memory. */
 static pid_t fork_blocked(struct child *c)
@@ -124,7 +131,7 @@ static pid_t fork_blocked(struct child *c)
     pthread_sigmask(SIG_SETMASK, &all, &old);
     pid_t pid = c == NULL ? fork()
                           : clone(child_main, stack + sizeof stack,
-                                  SIGCHLD | (c->p->before == NULL ? CLONE_VM | CLONE_VFORK : 0), c);
+                                  SIGCHLD | (c->p->before == NULL ? IN_OUR_MEMORY : 0), c);
     if (pid != 0)
         pthread_sigmask(SIG_SETMASK, &old, NULL);
     return pid;
