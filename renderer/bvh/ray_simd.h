@@ -22,15 +22,16 @@ struct rayv {
     vi ignore;
 };
 
-/* a[lane[0]], a[lane[1]], ... */
-INLINE vf gather(const float *a, const uint16_t *lane, bool in_row)
+/* a[lane[0]], a[lane[1]], ... of floats or whole numbers */
+INLINE vf gather(const void *a, const uint16_t *lane, bool in_row)
 {
+    const char *at = a;
+    float v[LANES];
     if (in_row)
-        return vf_load_any(a + lane[0]);
-    vf v = vf_set(0);
+        return vf_load_any(at + sizeof *v * lane[0]);
     for (int i = 0; i < LANES; i++)
-        v[i] = a[lane[i]];
-    return v;
+        memcpy(v + i, at + sizeof *v * lane[i], sizeof *v);
+    return vf_load_any(v);
 }
 
 /* As shape_shear(). */
@@ -105,7 +106,7 @@ INLINE void rayv_init(const struct rays *r, const uint16_t lane[LANES], struct r
 /* What has been met so far is in h. */
 INLINE void rayv_go_on(const struct hits *h, const uint16_t lane[LANES], struct rayv *q)
 {
-    vi prim = (vi)gather((const float *)h->prim, lane, q->in_row), met = vi_lt(vi_set(-1), prim);
+    vi prim = (vi)gather(h->prim, lane, q->in_row), met = vi_lt(vi_set(-1), prim);
     q->limit = vf_select(met, gather(h->t, lane, q->in_row), q->limit);
     q->prim = vi_select(met, prim, q->prim);
     q->u = gather(h->u, lane, q->in_row);
@@ -124,7 +125,7 @@ static inline const uint16_t *rayv_from(const uint16_t *lane, int k, int n, uint
 
 INLINE void rayv_ignore(const struct rays *r, const uint16_t lane[LANES], struct rayv *q)
 {
-    q->ignore = (vi)gather((const float *)r->ignore, lane, q->in_row);
+    q->ignore = (vi)gather(r->ignore, lane, q->in_row);
 }
 
 /* What the coordinates of boxes are grown by. The triangle test moves corners by at most 6 half steps
