@@ -6,8 +6,9 @@
 
 /* One batch: rays that are alike go in packets, the others one by one. h is NULL: occlusion. */
 INLINE void trace(const struct wide *w, const struct rays *r, const uint16_t *lane, int num_lanes,
-                  bool any, struct hits *h, bool *occluded, struct bvh_stats *stats)
+                  struct hits *h, bool *occluded, struct bvh_stats *stats)
 {
+    const bool any = h == NULL;
     struct rayv octet, *o = &octet;
     for (int k = 0; k < num_lanes; k += LANES) {
         uint16_t filled[LANES];
@@ -17,7 +18,7 @@ INLINE void trace(const struct wide *w, const struct rays *r, const uint16_t *la
         rayv_init(r, eight, o);
         if (any)
             rayv_ignore(r, eight, o);
-        else if (h != NULL && w->flat != NULL)
+        else if (w->flat != NULL)
             rayv_go_on(h, eight, o);
         rayv_slabs(w, o);
         if (full && are_alike(w, o)) {
@@ -67,7 +68,7 @@ static void closest(const struct wide *w, const struct rays *r, const uint16_t *
         num_lanes = w->list->closest(w, r, lane, num_lanes, h, left, stats);
         lane = left;
     }
-    trace(w, r, lane, num_lanes, false, h, NULL, stats);
+    trace(w, r, lane, num_lanes, h, NULL, stats);
 }
 
 static void occluded(const struct wide *w, const struct rays *r, const uint16_t *lane,
@@ -79,7 +80,7 @@ static void occluded(const struct wide *w, const struct rays *r, const uint16_t 
         num_lanes = w->list->occluded(w, r, lane, num_lanes, occluded, left, stats);
         lane = left;
     }
-    trace(w, r, lane, num_lanes, true, NULL, occluded, stats);
+    trace(w, r, lane, num_lanes, NULL, occluded, stats);
 }
 
 const struct traverse FOR_ISA(traverse) = {.closest = closest, .occluded = occluded};
