@@ -4,7 +4,7 @@
 # Builds each bug of DIR (tests/mutants; or those named) into a renderer of its own,
 # BUILD/mutants/NAME/pathtracer (A+B: both in one), and runs it through the suite against goldens and closed forms until a
 # verdict gives it away, or S seconds on one processor are over (120: as much as 60 s on two). As many run at a time
-# as there are processors. Mutants follow eight paths at a time, in the widest instructions of this machine, as users do; bugs of
+# as there are processors. Mutants run in the widest instructions of this machine, as users do; bugs of
 # the binary hierarchy and of its shapes run with --accel sah. "none" is the renderer as it is, of which nothing may differ.
 #   --build-only   builds, and that is all
 #   --quick        three bugs of different kinds and "none" (or those named), on two scenes, compiled in half the time: for `make check`
