@@ -1,5 +1,5 @@
-/* Rays, a lane each, against every primitive of a list, each ray sheared along its own largest axis. Part of traverse.c
- * and small_scene_trace.c. */
+/* Rays, a lane each, against every primitive of a list, each ray sheared along its own largest axis. Part of
+ * small_scene_trace.c. */
 #ifndef ASSAY_SMALL_SCENE_HIT_H
 #define ASSAY_SMALL_SCENE_HIT_H
 

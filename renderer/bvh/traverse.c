@@ -1,5 +1,5 @@
-/* The rays of a batch against a list, if there is one, and then the tree, compiled once for each instruction set. The parts are
- * headers, so that each loop is one piece to the compiler. */
+/* The rays of a batch against a list, if there is one, and then the tree, compiled once for each instruction set. The
+ * parts are headers, so that each loop is one piece to the compiler. */
 #include "traverse.h"
 #include "traverse_packet.h"
 #include "traverse_single.h"
