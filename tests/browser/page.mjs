@@ -35,6 +35,8 @@ async function open(path, width, height, options = {}) {
   await page.evaluate("loadAll()");
   return page;
 }
+// What follows an event comes when the browser finds time: whether locator gets into state within ten seconds.
+const becomes = (locator, state) => locator.waitFor({ state, timeout: 10000 }).then(() => true, () => false);
 const frames = (page) => page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
 
 const page = await open(pagePath, 1280, 900);
@@ -266,7 +268,7 @@ check("a plot grows to the window, and the wheel looks closer", large.width > 90
 await page.keyboard.press("0");
 check("and shows all again", (await seen()) === [x0, y0, ...whole.split(/[ ,]+/).slice(2).map(Number)].join(" "), await seen());
 await page.keyboard.press("Escape");
-check("and closes", (await page.locator("dialog.large").count()) === 0);
+check("and closes", await becomes(page.locator("dialog.large"), "detached"));
 check("a plot is saved as an SVG that stands alone", plot.startsWith("<svg") && !/var\(|class=|style=/.test(plot) && /<circle[^>]*fill="rgb/.test(plot) &&
   await page.evaluate((text) => new DOMParser().parseFromString(text, "image/svg+xml").querySelector("parsererror") === null, plot), plot.slice(0, 300));
 const bare = await page.evaluate(`[...document.querySelectorAll("figure")].filter((f) => f.querySelector("svg.plot") &&
@@ -303,9 +305,7 @@ await column("Against", 4, String, (a, b) => (a < b ? -1 : a > b ? 1 : 0));
 await page.getByRole("button", { name: "Fold all", exact: true }).click();
 check("evidence is folded", !await article.locator(".maps").isVisible());
 await page.locator("#claims a[href='#" + await article.getAttribute("id") + "']").click();
-// By an event, which comes when the browser finds time.
-await article.locator(".maps").waitFor({ state: "visible", timeout: 10000 }).catch(() => {});
-check("a row's link unfolds its evidence", await article.locator(".maps").isVisible());
+check("a row's link unfolds its evidence", await becomes(article.locator(".maps"), "visible"));
 await page.getByRole("button", { name: "Unfold all evidence" }).click();
 check("all evidence is unfolded", await page.locator(".evidence:not([open])").count() === 0);
 
