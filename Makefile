@@ -142,7 +142,7 @@ endef
 isa_sse42  := -msse4.2
 isa_avx2   := -mavx2 -mfma -mbmi -mbmi2 -mpopcnt -mlzcnt
 isa_avx512 := $(isa_avx2) -mavx512f -mavx512vl -mavx512bw -mavx512dq
-# -Wno-psabi: no vector of 32 bytes leaves the file.
+# -Wno-psabi: no vector of 32 or 64 bytes leaves the file.
 isa_lanes   = $(if $(and $(filter avx512,$(1)),$(filter $(SIXTEEN),$(2))),16,8)
 isa_flags   = -DISA=$(1) $(if $(isa_$(1)),-DLANES=$(isa_lanes)) $(isa_$(1)) -Wno-psabi
 define kernel_object

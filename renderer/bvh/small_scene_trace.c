@@ -19,12 +19,6 @@ INLINE int keep(const struct wide *w, struct rayv *q, const uint16_t *from, unsi
     return num;
 }
 
-/* Of a list of n lanes those from k on that are no repetition (rayv_from()). */
-INLINE unsigned lanes_from(int k, int n)
-{
-    return n - k < LANES ? (1u << (n - k)) - 1 : (unsigned)ALL_LANES;
-}
-
 static int closest(const struct wide *w, const struct rays *r, const uint16_t *lane, int num_lanes,
                    struct hits *h, uint16_t *left, struct bvh_stats *stats)
 {
@@ -48,7 +42,7 @@ static int closest(const struct wide *w, const struct rays *r, const uint16_t *l
             place[i] = place[i] < 0 ? -1 : w->flat->number[place[i]];
         rayv_store(&q, from, best.t, best.u, best.v, vi_load_any(place), h);
         q.limit = best.t;
-        num = keep(w, &q, from, lanes_from(k, num_lanes), left, num);
+        num = keep(w, &q, from, lanes_there(k, num_lanes), left, num);
     }
     return num;
 }
@@ -69,7 +63,7 @@ static int occluded(const struct wide *w, const struct rays *r, const uint16_t *
         if (w->num_nodes == 0)
             continue;
         q.limit = q.tmax;
-        num = keep(w, &q, from, lanes_from(k, num_lanes) & ~bits(met), left, num);
+        num = keep(w, &q, from, lanes_there(k, num_lanes) & ~bits(met), left, num);
     }
     return num;
 }

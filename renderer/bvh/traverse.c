@@ -13,8 +13,8 @@ INLINE void trace(const struct wide *w, const struct rays *r, const uint16_t *la
     for (int k = 0; k < num_lanes; k += LANES) {
         uint16_t filled[LANES];
         const uint16_t *eight = rayv_from(lane, k, num_lanes, filled);
-        unsigned open = num_lanes - k < LANES ? (1u << (num_lanes - k)) - 1 : 255;
-        const bool full = open == 255;
+        unsigned open = lanes_there(k, num_lanes);
+        const bool full = open == ALL_LANES;
         rayv_init(r, eight, o);
         if (any)
             rayv_ignore(r, eight, o);

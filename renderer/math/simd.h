@@ -39,6 +39,24 @@ enum { COLUMNS = 8, ALL_LANES = (1 << LANES) - 1 };
 
 #define INLINE static inline __attribute__((always_inline))
 
+#if LANES > 1
+typedef float vf __attribute__((vector_size(4 * LANES)));
+typedef int32_t vi __attribute__((vector_size(4 * LANES)));
+typedef uint32_t vu __attribute__((vector_size(4 * LANES)));
+
+/* Lane i, to read or to write. */
+#define LANE(v, i) ((v)[i])
+
+INLINE vf vf_of_int(vi a)
+{
+    return __builtin_convertvector(a, vf);
+}
+INLINE vi vi_truncate(vf a)
+{
+    return __builtin_convertvector(a, vi);
+}
+#endif
+
 #if LANES == 1
 #include "simd_one.h"
 #elif LANES == 16
@@ -47,6 +65,11 @@ enum { COLUMNS = 8, ALL_LANES = (1 << LANES) - 1 };
 #include "simd_eight.h"
 #endif
 
+/* The lanes from number k on of n: a mask for bits(). */
+INLINE unsigned lanes_there(int k, int n)
+{
+    return n - k >= LANES ? (unsigned)ALL_LANES : (1u << (n - k)) - 1;
+}
 /* The same bits as the other type. */
 INLINE vi as_vi(vf a)
 {

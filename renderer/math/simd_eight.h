@@ -6,13 +6,6 @@
 
 #include <immintrin.h>
 
-typedef float vf __attribute__((vector_size(32)));
-typedef int32_t vi __attribute__((vector_size(32)));
-typedef uint32_t vu __attribute__((vector_size(32)));
-
-/* Lane i, to read or to write. */
-#define LANE(v, i) ((v)[i])
-
 INLINE vf vf_set(float x)
 {
     return (vf){x, x, x, x, x, x, x, x};
@@ -29,14 +22,6 @@ INLINE vf vf_load(const float *p)
 INLINE void vf_store(float *p, vf a)
 {
     *(vf *)p = a;
-}
-INLINE vf vf_of_int(vi a)
-{
-    return __builtin_convertvector(a, vf);
-}
-INLINE vi vi_truncate(vf a)
-{
-    return __builtin_convertvector(a, vi);
 }
 INLINE vi vi_numbers(void)
 {

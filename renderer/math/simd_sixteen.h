@@ -5,13 +5,6 @@
 
 #include <immintrin.h>
 
-typedef float vf __attribute__((vector_size(64)));
-typedef int32_t vi __attribute__((vector_size(64)));
-typedef uint32_t vu __attribute__((vector_size(64)));
-
-/* Lane i, to read or to write. */
-#define LANE(v, i) ((v)[i])
-
 INLINE vf vf_set(float x)
 {
     return (vf)_mm512_set1_ps(x);
@@ -19,14 +12,6 @@ INLINE vf vf_set(float x)
 INLINE vi vi_set(int32_t x)
 {
     return (vi)_mm512_set1_epi32(x);
-}
-INLINE vf vf_of_int(vi a)
-{
-    return __builtin_convertvector(a, vf);
-}
-INLINE vi vi_truncate(vf a)
-{
-    return __builtin_convertvector(a, vi);
 }
 INLINE vi vi_numbers(void)
 {

@@ -72,9 +72,11 @@ static inline uint32_t choose_in_cluster(const struct light_clusters *t, int clu
                                          float *probability)
 {
     const uint32_t first = t->first[cluster], count = t->first[cluster + 1] - first;
-    const uint32_t i = count == 1 ? 0 : discrete_pick(t->end + first, count, *u);
-    *u = count == 1 ? *u : discrete_part(t->end + first, i, *u);
-    *u = minf(*u, 1 - 0x1p-24f);
+    uint32_t i = 0;
+    if (count > 1) {
+        i = discrete_pick(t->end + first, count, *u);
+        *u = minf(discrete_part(t->end + first, i, *u), 1 - 0x1p-24f);
+    }
     *probability = discrete_probability(t->end + first, i);
     return t->light[first + i];
 }

@@ -186,15 +186,14 @@ static __attribute__((noinline)) void sample_textured(const struct scene *s,
 {
     int32_t number[LANES];
     vf b1, b2;
-    const uint32_t map = s->materials[s->tri_material[light->first]].radiance_map;
-    const rgb radiance = s->materials[s->tri_material[light->first]].radiance;
+    const struct material *m = &s->materials[s->tri_material[light->first]];
     sample_mesh(l, p, u, number, out);
     warp_triangle(u[0], u[1], &b1, &b2);
     for (; mask; mask &= mask - 1) {
         int i = __builtin_ctz(mask);
-        rgb texel =
-            scene_map_at(s, map, light->first + (uint32_t)number[i], LANE(b1, i), LANE(b2, i));
-        rgb_set_lane(&out->radiance, i, rgb_mul(radiance, texel));
+        rgb texel = scene_map_at(s, m->radiance_map, light->first + (uint32_t)number[i],
+                                 LANE(b1, i), LANE(b2, i));
+        rgb_set_lane(&out->radiance, i, rgb_mul(m->radiance, texel));
         LANE(out->pdf_w, i) *=
             rgb_is_zero(texel) ? 0 : l->record[LAMP_WORDS * (size_t)number[i] + LAMP_WEIGHT];
     }

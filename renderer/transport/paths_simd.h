@@ -12,12 +12,6 @@ static inline bool counts(const struct integrator *it, int bounces)
     return bounces >= it->opt.first_bounce && bounces <= it->opt.max_bounces;
 }
 
-/* Bits of the lanes of the paths from k that a batch of n has. */
-INLINE unsigned lanes_there(int k, int n)
-{
-    return n - k >= LANES ? (unsigned)ALL_LANES : (1u << (n - k)) - 1;
-}
-
 INLINE void pick_v3(struct vec3s *a, int i, vec3v v, vi order)
 {
     v3_store(a, i, v3v(pick(v.x, order), pick(v.y, order), pick(v.z, order)));
