@@ -322,7 +322,7 @@ static bool watch(const struct process *p, struct run *r, double t0, int *status
         drain(r);
         if (wait_for(r->child, status, WNOHANG, usage) == r->child)
             return late;
-        double t = now_seconds();
+        double t = progress_seconds();
         if (!late && p->timeout_s > 0 && t - t0 >= p->timeout_s) {
             late = true;
             kill_at = t + GRACE_S;
@@ -351,7 +351,7 @@ bool process_run(const struct process *p, struct process_usage *usage, struct er
     if (p->log != NULL &&
         (r.log = open(p->log, O_CREAT | O_TRUNC | O_WRONLY | O_CLOEXEC, 0666)) < 0)
         return err_set(e, "%s: cannot write: %s", p->log, strerror(errno));
-    double t0 = now_seconds();
+    double t0 = progress_seconds();
     if (!start(p, path, &r, e)) {
         close_if_open(&r.log);
         return false;
@@ -365,7 +365,7 @@ bool process_run(const struct process *p, struct process_usage *usage, struct er
     close_if_open(&r.out);
     if (r.log >= 0 && close(r.log) != 0 && r.log_errno == 0)
         r.log_errno = errno;
-    double wall = now_seconds() - t0;
+    double wall = progress_seconds() - t0;
     if (usage != NULL)
         *usage = (struct process_usage){
             .wall_s = wall,

@@ -201,7 +201,7 @@ bool engine_render(const struct engine *en, const struct suite_scene *scene,
 {
     char work[PATH_MAX];
     struct engine_job j = {.en = en, .suite = scene, .opt = opt};
-    double start = now_seconds();
+    double start = progress_seconds();
     assert(opt->threads > 0);
     j.spp = opt->spp > 0 ? opt->spp : en->spp;
     j.replicates = en->output != OUTPUT_MEAN ? 1
@@ -217,7 +217,7 @@ bool engine_render(const struct engine *en, const struct suite_scene *scene,
     j.independence = opt->check_independence ? json_object() : NULL;
     bool rendered = engine_program(en, "command", j.program, sizeof j.program, e) &&
                     engine_write_scene(en, scene, dir.s, j.scene, e) && run_all(&j, out, e);
-    bool ok = rendered && engine_describe(&j, out, now_seconds() - start, manifest, e) &&
+    bool ok = rendered && engine_describe(&j, out, progress_seconds() - start, manifest, e) &&
               fs_remove_tree(dir.s, e);
     json_decref(j.independence);
     if (ok)

@@ -4,7 +4,7 @@
 #include <time.h>
 #include <unistd.h>
 
-double now_seconds(void)
+double progress_seconds(void)
 {
     struct timespec t;
     clock_gettime(CLOCK_MONOTONIC, &t);
@@ -17,7 +17,7 @@ void progress_start(struct progress *p, const char *what, const char *unit, bool
                            .unit = unit,
                            .quiet = quiet,
                            .terminal = isatty(STDERR_FILENO) == 1,
-                           .start = now_seconds()};
+                           .start = progress_seconds()};
     p->last = p->start;
 }
 
@@ -29,7 +29,7 @@ static void print_rate(const struct progress *p, double done, double seconds)
 
 void progress_update(struct progress *p, double done, double total)
 {
-    double now = now_seconds();
+    double now = progress_seconds();
     if (p->quiet || now - p->last < (p->terminal ? 0.2 : 10))
         return;
     p->last = now;
@@ -54,7 +54,7 @@ void progress_end(struct progress *p, double total)
 {
     if (p->quiet)
         return;
-    double seconds = now_seconds() - p->start;
+    double seconds = progress_seconds() - p->start;
     fprintf(stderr, "%s%s: %.1f s", p->terminal ? "\r" : "", p->what, seconds);
     print_rate(p, total, seconds);
     fputs(p->terminal ? "\033[K\n" : "\n", stderr);

@@ -14,7 +14,7 @@ struct progress {
 };
 
 /* Wall-clock seconds of a clock that never jumps. */
-double now_seconds(void);
+double progress_seconds(void);
 
 void progress_start(struct progress *p, const char *what, const char *unit, bool quiet);
 /* Call as often as you like; prints at most 5 times a second (terminal) or every 10 s (log). */

@@ -187,7 +187,7 @@ static void instance_geometry(struct loader *ld, const xmlNode *instance, const 
     const xmlNode *geometry = reference_follow(ld, instance, "url", "geometry");
     const mat4 change = enter(ld, geometry, &at->frame, &inside),
                to_world = mat4_mul(&at->to_world, &change);
-    const struct mesh *mesh = geometry_get(ld, geometry);
+    const struct mesh *mesh = mesh_of_geometry(ld, geometry);
     if (ld->failed)
         return;
     if (mesh->is_sphere) {

@@ -14,7 +14,7 @@ void *build_grow_now(struct loader *ld, void *data, size_t size, size_t count)
     size_t more = count < 8 ? 8 : 2 * count;
     void *p = more <= SIZE_MAX / size ? realloc(data, more * size) : NULL;
     if (p == NULL)
-        fail_memory(ld);
+        element_fail_memory(ld);
     return p != NULL ? p : data;
 }
 

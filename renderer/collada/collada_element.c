@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-bool fail_line(struct loader *ld, const xmlNode *n, long line, const char *fmt, ...)
+bool element_fail_line(struct loader *ld, const xmlNode *n, long line, const char *fmt, ...)
 {
     char text[900];
     va_list ap;
@@ -21,9 +21,9 @@ bool fail_line(struct loader *ld, const xmlNode *n, long line, const char *fmt, 
                     : err_set(ld->err, "%s: %s", path, text);
 }
 
-bool fail_memory(struct loader *ld)
+bool element_fail_memory(struct loader *ld)
 {
-    return fail_line(ld, NULL, 0, "out of memory");
+    return element_fail_line(ld, NULL, 0, "out of memory");
 }
 
 bool element_fail_unexpected(struct loader *ld, const xmlNode *child)

@@ -136,11 +136,11 @@ const struct document *xml_open(struct loader *ld, const char *path, FILE *file,
 /* collada_element.c */
 
 /* Sets the line "path:line: ...", unless one is set. Always false. */
-#define fail_at(ld, n, ...) fail_line(ld, n, element_line(n), __VA_ARGS__)
+#define fail_at(ld, n, ...) element_fail_line(ld, n, element_line(n), __VA_ARGS__)
 /* n: of the document that is meant; NULL: ld->path. line 0: of no line. */
-bool fail_line(struct loader *ld, const xmlNode *n, long line, const char *fmt, ...)
+bool element_fail_line(struct loader *ld, const xmlNode *n, long line, const char *fmt, ...)
     __attribute__((format(printf, 4, 5)));
-bool fail_memory(struct loader *ld);
+bool element_fail_memory(struct loader *ld);
 /* "unexpected <child> in <parent>". */
 bool element_fail_unexpected(struct loader *ld, const xmlNode *child);
 long element_line(const xmlNode *n);
@@ -311,7 +311,7 @@ struct inputs source_read_inputs(struct loader *ld, struct sources *all, const x
 void source_release(struct sources *all);
 
 /* collada_mesh.c: NULL: failed. */
-const struct mesh *geometry_get(struct loader *ld, const xmlNode *geometry);
+const struct mesh *mesh_of_geometry(struct loader *ld, const xmlNode *geometry);
 void mesh_release(struct mesh *m);
 
 /* collada_material.c */

@@ -107,7 +107,7 @@ void light_finish(struct loader *ld)
                                 ? environment_upper_half(ld->ambient, ld->err)
                                 : environment_constant(ld->ambient, ld->err);
     if (ld->scene.environment == NULL)
-        fail_memory(ld);
+        element_fail_memory(ld);
 }
 
 /* What Blender's exporter wrote beside, from 2.80 on, of a light that is as it wrote it; else NULL. */

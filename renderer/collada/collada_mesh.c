@@ -120,7 +120,7 @@ static void add_polygon(struct loader *ld, const xmlNode *p, struct work *w,
     enum triangulate_result result = triangulate(work->points, (uint32_t)n, work->index);
     ld->num_left_out[LEFT_OUT_CROSSED] += result == TRIANGULATE_CROSSED;
     if (result == TRIANGULATE_MEMORY)
-        fail_memory(ld);
+        element_fail_memory(ld);
     for (size_t t = 0; t < n - 2; t++) {
         if (m->num_triangles >= MAX_TRIANGLES)
             fail_at(ld, p, "more than %d triangles", MAX_TRIANGLES);
@@ -211,7 +211,7 @@ static void read_mesh(struct loader *ld, struct mesh *m, const xmlNode *node)
                   "linestrips* extra*");
     struct work w = {.mesh = m, .polygon = malloc(sizeof *w.polygon)};
     if (w.polygon == NULL)
-        fail_memory(ld);
+        element_fail_memory(ld);
     for (const xmlNode *c = element_first(node); !ld->failed && c != NULL; c = element_next(c)) {
         ld->num_left_out[LEFT_OUT_LINES] += element_is_one_of(c, "lines linestrips");
         for (size_t k = 0; k < sizeof KINDS / sizeof *KINDS; k++) {
@@ -256,7 +256,7 @@ static void read_geometry(struct loader *ld, const xmlNode *geometry, struct mes
         fail_at(ld, geometry, "<geometry> without a <mesh>");
 }
 
-const struct mesh *geometry_get(struct loader *ld, const xmlNode *geometry)
+const struct mesh *mesh_of_geometry(struct loader *ld, const xmlNode *geometry)
 {
     for (size_t i = 0; i < ld->num_meshes; i++)
         if (ld->meshes[i].node == geometry)

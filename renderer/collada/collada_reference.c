@@ -57,7 +57,7 @@ static const struct document *open_beside(struct loader *ld, const xmlNode *n,
     char *kept = strdup(path.s);
     s->documents = build_grow(ld, s->documents, sizeof *s->documents, s->num_documents);
     if (kept == NULL || ld->failed) {
-        fail_memory(ld);
+        element_fail_memory(ld);
         free(kept);
     } else {
         s->documents[s->num_documents++] = kept;

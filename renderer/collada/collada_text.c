@@ -35,8 +35,8 @@ static bool fail_token(struct loader *ld, const xmlNode *n, long line, const cha
                        const char *wanted)
 {
     size_t length = strcspn(s, BLANKS);
-    return fail_line(ld, n, line, "<%.60s>: '%.*s' is not %s", (const char *)n->name,
-                     (int)(length < 40 ? length : 40), s, wanted);
+    return element_fail_line(ld, n, line, "<%.60s>: '%.*s' is not %s", (const char *)n->name,
+                             (int)(length < 40 ? length : 40), s, wanted);
 }
 
 bool text_read_doubles(struct loader *ld, const xmlNode *n, struct doubles *out)
@@ -106,6 +106,6 @@ const char *text_read_word(struct loader *ld, const xmlNode *n)
         size--;
     word = (const char *)xmlDictLookup(n->doc->dict, (const xmlChar *)start, (int)size);
     if (word == NULL)
-        fail_memory(ld);
+        element_fail_memory(ld);
     return word != NULL ? word : "";
 }

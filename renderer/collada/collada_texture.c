@@ -41,7 +41,7 @@ static const struct image *get_image(struct loader *ld, const xmlNode *image)
     }
     s->num_images++;
     if (!image_set_attr(im, SCENE_IMAGE_FILE, file.s, &why))
-        fail_memory(ld);
+        element_fail_memory(ld);
     return im;
 }
 

@@ -39,9 +39,9 @@ static void complain(void *ctx, xml_complaint error)
     if (ctxt == NULL || error->level < XML_ERR_ERROR)
         return;
     if (error->code == XML_ERR_NO_MEMORY)
-        fail_memory(ctxt->_private);
-    fail_line(ctxt->_private, NULL, error->line, "not well-formed: %.*s", (int)strcspn(text, "\n"),
-              text);
+        element_fail_memory(ctxt->_private);
+    element_fail_line(ctxt->_private, NULL, error->line, "not well-formed: %.*s",
+                      (int)strcspn(text, "\n"), text);
 }
 
 /* Without document types there are no entities to expand, so no entity bombs and no outside files.
@@ -53,7 +53,8 @@ static void document_type(void *ctx, const xmlChar *name, const xmlChar *externa
     (void)external;
     (void)system;
     xmlParserCtxt *ctxt = ctx;
-    fail_line(ctxt->_private, NULL, ctxt->input->line, "a document type (DOCTYPE) is not accepted");
+    element_fail_line(ctxt->_private, NULL, ctxt->input->line,
+                      "a document type (DOCTYPE) is not accepted");
     xmlStopParser(ctxt);
 }
 
@@ -72,9 +73,9 @@ static int read_some(void *context, char *buffer, int size)
     struct loader *ld = context;
     size_t n = fread(buffer, 1, (size_t)size, ld->file);
     if (ferror(ld->file))
-        fail_line(ld, NULL, 0, "cannot read: %s", strerror(errno));
+        element_fail_line(ld, NULL, 0, "cannot read: %s", strerror(errno));
     if (ftell(ld->file) > MAX_FILE_BYTES)
-        fail_line(ld, NULL, 0, "larger than %d bytes", MAX_FILE_BYTES);
+        element_fail_line(ld, NULL, 0, "larger than %d bytes", MAX_FILE_BYTES);
     return ld->failed ? -1 : (int)n;
 }
 
@@ -97,11 +98,11 @@ static bool parse(struct loader *ld, struct document *d)
             xmlCtxtReadIO(ctxt, read_some, NULL, ld, NULL, NULL, XML_PARSE_NONET | XML_PARSE_HUGE);
     }
     if (ctxt == NULL || ctxt->errNo == XML_ERR_NO_MEMORY)
-        fail_memory(ld);
+        element_fail_memory(ld);
     xmlFreeParserCtxt(ctxt);
     xmlSetStructuredErrorFunc(NULL, NULL);
     return (d->doc != NULL && xmlDocGetRootElement(d->doc) != NULL && !ld->failed) ||
-           fail_line(ld, NULL, 1, "not well-formed: no XML document");
+           element_fail_line(ld, NULL, 1, "not well-formed: no XML document");
 }
 
 /* The survey of the whole document: ids, dialect, and what may not be anywhere. */
@@ -154,7 +155,7 @@ static void add_id(struct loader *ld, struct document *d, const xmlNode *n)
     bool is_first = xmlHashLookup(d->ids, id) == NULL;
     if ((is_first ? xmlHashAddEntry(d->ids, id, (xmlNode *)n)
                   : xmlHashUpdateEntry(d->ids, id, d, NULL)) != 0)
-        fail_memory(ld);
+        element_fail_memory(ld);
 }
 
 static void survey(struct loader *ld, struct document *d, const xmlNode *n, int depth,
@@ -204,7 +205,7 @@ const struct document *xml_open(struct loader *ld, const char *path, FILE *file,
     ld->documents = build_grow(ld, ld->documents, sizeof(void *), ld->num_documents);
     if (ld->failed || d == NULL) {
         free(d);
-        fail_memory(ld);
+        element_fail_memory(ld);
         return NULL;
     }
     ld->documents[ld->num_documents++] = d;
@@ -218,7 +219,7 @@ const struct document *xml_open(struct loader *ld, const char *path, FILE *file,
     d->doc->_private = d;
     d->ids = xmlHashCreateDict(0, d->doc->dict);
     if (d->ids == NULL)
-        fail_memory(ld);
+        element_fail_memory(ld);
     const xmlNode *root = xmlDocGetRootElement(d->doc);
     if (!check_root(ld, root))
         return NULL;

@@ -6,7 +6,8 @@
 
 const char *const sampler_kind_names[] = {"independent", "sobol", NULL};
 
-void philox4x32(const uint32_t counter[4], const uint32_t key[2], int rounds, uint32_t out[4])
+void sampler_philox4x32(const uint32_t counter[4], const uint32_t key[2], int rounds,
+                        uint32_t out[4])
 {
     assert(rounds <= PHILOX_ROUNDS);
     const struct philox_keys keys = philox_keys(key[0] | (uint64_t)key[1] << 32);

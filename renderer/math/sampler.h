@@ -39,7 +39,8 @@ enum sampler_purpose {
 };
 
 /* The raw generator, `rounds` rounds (10 everywhere but in its test). */
-void philox4x32(const uint32_t counter[4], const uint32_t key[2], int rounds, uint32_t out[4]);
+void sampler_philox4x32(const uint32_t counter[4], const uint32_t key[2], int rounds,
+                        uint32_t out[4]);
 
 /* Independent numbers, for what needs no choice of a sampler. */
 struct sample4 sampler_get(uint64_t seed, uint32_t pixel, uint32_t sample, uint32_t vertex,

@@ -113,8 +113,8 @@ static inline struct sobol_keys sobol_keys(uint64_t seed, uint32_t vertex, uint3
     const uint32_t key[2] = {(uint32_t)seed, (uint32_t)(seed >> 32)};
     uint32_t order[4];
     struct sobol_keys k;
-    philox4x32((const uint32_t[]){0, 0, vertex, purpose}, key, PHILOX_ROUNDS, order);
-    philox4x32((const uint32_t[]){0, 1, vertex, purpose}, key, PHILOX_ROUNDS, k.scramble);
+    sampler_philox4x32((const uint32_t[]){0, 0, vertex, purpose}, key, PHILOX_ROUNDS, order);
+    sampler_philox4x32((const uint32_t[]){0, 1, vertex, purpose}, key, PHILOX_ROUNDS, k.scramble);
     k.order = order[0];
     return k;
 }

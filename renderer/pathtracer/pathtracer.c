@@ -282,14 +282,14 @@ static bool run(struct session *s, struct err *e)
     struct bvh *bvh = NULL;
     bool ok = load_scene(o, &scene, e) && (o->num_seeds > 1 || output_check(&s->out, e)) &&
               setup_camera(o, &scene, &camera, e) && render_id_make(o, &scene, &id, e);
-    double start = now_seconds();
+    double start = progress_seconds();
     if (ok)
         bvh = bvh_build_on(&scene, (enum bvh_kind)o->accel, (enum isa)o->isa, o->threads, e);
     ok = bvh != NULL;
     if (ok) {
         snprintf(s->out.accel, sizeof s->out.accel,
                  "%s: %u nodes, depth %d, SAH cost %.1f, built in %.3f s", bvh_kind_names[o->accel],
-                 bvh_num_nodes(bvh), bvh_depth(bvh), bvh_sah_cost(bvh), now_seconds() - start);
+                 bvh_num_nodes(bvh), bvh_depth(bvh), bvh_sah_cost(bvh), progress_seconds() - start);
         s->out.id = &id;
         s->out.scene = &scene;
     }

@@ -29,7 +29,7 @@ void integrator_free(struct integrator *it)
     it->stages = NULL;
 }
 
-void integrate(const struct integrator *it, struct batch *b, int num_lanes)
+void integrator_run(const struct integrator *it, struct batch *b, int num_lanes)
 {
     it->stages->integrate(it, b, num_lanes);
 }

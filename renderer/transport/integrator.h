@@ -110,7 +110,7 @@ struct batch {
     struct bvh_stats stats;
 };
 
-void integrate(const struct integrator *it, struct batch *b, int num_lanes);
+void integrator_run(const struct integrator *it, struct batch *b, int num_lanes);
 
 /* One light, chosen by place, is sampled at a vertex and not each of them. */
 static inline bool chooses_light(const struct integrator *it)

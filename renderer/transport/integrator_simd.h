@@ -8,7 +8,7 @@
 #include "renderer/base/isa.h"
 
 struct integrator_simd {
-    /* integrate() */
+    /* integrator_run() */
     void (*integrate)(const struct integrator *it, struct batch *b, int num_lanes);
     /* Adds the radiance of lane i of a batch to pixel[i]. first: these pixels have no sample yet. */
     void (*film_add)(struct film *f, const size_t *pixel, int num_lanes, const struct batch *b,

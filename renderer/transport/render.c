@@ -74,7 +74,7 @@ static void render_tile(struct job *j, struct batch *b, int tile)
             b->pixel[i] = pixel[i];
             b->sample[i] = o->first_sample + k;
         }
-        integrate(j->it, b, n);
+        integrator_run(j->it, b, n);
         atomic_fetch_add_explicit(&j->samples_done, (unsigned)n, memory_order_relaxed);
         j->it->stages->film_add(f, at, n, b, k == 0);
         for (int i = 0; f->first != NULL && i < n; i++)
@@ -216,14 +216,14 @@ static bool render_passes(struct job *j, struct watch *w, enum render_end *end, 
             left = left < to_check ? left : to_check;
         }
         uint32_t count = step < left ? step : left;
-        double before = now_seconds();
+        double before = progress_seconds();
         if (!render_pass(j, w, f->num_samples + count, e))
             return false;
-        double now = now_seconds(), each = (now - before) / count;
+        double now = progress_seconds(), each = (now - before) / count;
         if (c->write != NULL && c->write_every > 0 && now - w->last_write >= c->write_every) {
             if (!c->write(c->arg, f, e))
                 return false;
-            w->last_write = now_seconds();
+            w->last_write = progress_seconds();
         }
         if (w->asked && f->num_samples < j->opt->num_samples) {
             *end = RENDER_ASKED;
@@ -320,7 +320,7 @@ bool render_film(const struct scene *s, const struct camera *c, const struct bvh
         return false;
     }
     struct job j = {.it = &it, .opt = opt, .film = film};
-    double wall = now_seconds(), cpu = cpu_seconds();
+    double wall = progress_seconds(), cpu = cpu_seconds();
     double pixels = (double)opt->width * opt->height;
     struct watch w = {.control = control != NULL ? control : &uncontrolled,
                       .progress = progress,
@@ -346,7 +346,7 @@ bool render_film(const struct scene *s, const struct camera *c, const struct bvh
     stats->rays.box_tests += j.stats.box_tests;
     stats->rays.primitive_tests += j.stats.primitive_tests;
     stats->samples += (double)atomic_load(&j.samples_done);
-    stats->wall_seconds = now_seconds() - wall;
+    stats->wall_seconds = progress_seconds() - wall;
     stats->cpu_seconds = cpu_seconds() - cpu;
     integrator_free(&it);
     light_table_free(lights);

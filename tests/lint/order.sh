@@ -8,7 +8,7 @@ build=$(realpath "${1:?usage: tests/lint/order.sh BUILD}")
 folders=$(for top in renderer reference tools; do
     sed -nE 's/^\| (`[^|]*`) \|.*/\1/p' $top/README.md | tr -d '`,' | tr ' ' '\n' | sed "s,^,$top/,"
 done)
-strangers=16 # functions with another beginning, at most
+strangers=4 # functions with another beginning, at most
 
 # "FROM TO" of what the files on stdin include; within a folder TO has none.
 includes() {

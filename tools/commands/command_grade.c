@@ -15,7 +15,7 @@ int command_grade(int argc, char **argv, struct err *e)
         if (s.help)
             grade_options_help();
         code = s.help    ? 0
-               : s.slurm ? slurm_command(NULL, argc, argv, NULL, e)
+               : s.slurm ? command_slurm_run(NULL, argc, argv, NULL, e)
                          : grade_command(&s, argc, argv, e);
     }
     free(s.submission);

@@ -152,8 +152,8 @@ int command_gather(int argc, char **argv, struct err *e)
     return code;
 }
 
-int slurm_command(const char *dir, int argc, char **argv, const struct plan_wishes *w,
-                  struct err *e)
+int command_slurm_run(const char *dir, int argc, char **argv, const struct plan_wishes *w,
+                      struct err *e)
 {
     static const struct plan_wishes none = {0};
     struct plan p;
@@ -184,5 +184,5 @@ int command_slurm(int argc, char **argv, struct err *e)
                    "Begun again it goes on.\n");
         return 0;
     }
-    return slurm_command(w.dir, argc - w.first, argv + w.first, &w.wish, e);
+    return command_slurm_run(w.dir, argc - w.first, argv + w.first, &w.wish, e);
 }

@@ -18,7 +18,7 @@ static bool make_one(void *ctx, const struct suite_scene *scene, const struct su
     struct reference_state state;
     struct moments m;
     json_t *manifest;
-    double start = now_seconds();
+    double start = progress_seconds();
     if (!reference_options_state(c, scene, ref, &state, e))
         return false;
     if (state.there != NULL)
@@ -26,8 +26,8 @@ static bool make_one(void *ctx, const struct suite_scene *scene, const struct su
     fprintf(stderr, "%s: rendering with %s\n", scene->name, ref->engine);
     if (!reference_render(scene, ref, &state.opt, &m, &manifest, e))
         return false;
-    bool ok =
-        reference_options_write(c, scene, ref, state.key, &m, manifest, now_seconds() - start, e);
+    bool ok = reference_options_write(c, scene, ref, state.key, &m, manifest,
+                                      progress_seconds() - start, e);
     moments_free(&m);
     json_decref(manifest);
     return ok;
@@ -82,7 +82,7 @@ static bool make_described(void *ctx, const struct suite_scene *scene,
     struct moments m;
     struct err why;
     json_t *manifest;
-    double start = now_seconds();
+    double start = progress_seconds();
     if (!engine_expresses(&c->described, scene, c->work, &why)) {
         printf("%s cannot express %s: %s\n", c->described.name, scene->name, why.msg);
         return true;
@@ -99,7 +99,8 @@ static bool make_described(void *ctx, const struct suite_scene *scene,
                         member_text(manifest, "binary_sha256"), opt.seed)
                     .s,
                 key);
-    bool ok = reference_options_write(c, scene, ref, key, &m, manifest, now_seconds() - start, e);
+    bool ok =
+        reference_options_write(c, scene, ref, key, &m, manifest, progress_seconds() - start, e);
     moments_free(&m);
     json_decref(manifest);
     return ok;
@@ -113,7 +114,7 @@ int command_reference(int argc, char **argv, struct err *e)
     if (ok && c.slurm && !c.help) {
         char name[] = "reference", *word = argv[0]; /* or "render", of `golden render` */
         argv[0] = name;
-        code = slurm_command(NULL, argc, argv, NULL, e);
+        code = command_slurm_run(NULL, argc, argv, NULL, e);
         argv[0] = word;
     } else if (ok && (c.help || (c.last > 0     ? make_images(&c, e)
                                  : c.noise      ? make_noise(&c, e)

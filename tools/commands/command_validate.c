@@ -14,7 +14,7 @@ int command_validate(int argc, char **argv, struct err *e)
     if (c.help)
         code = 0;
     else if (c.slurm)
-        code = slurm_command(NULL, argc, argv, NULL, e);
+        code = command_slurm_run(NULL, argc, argv, NULL, e);
     else if (dir_lock_take(&lock, c.opt.out_dir, e) && validate(&c.opt, argc, argv, &results, e))
         code = validate_command_finish(&c, results, e);
     dir_lock_release(&lock);

@@ -25,7 +25,7 @@ int command_slurm(int argc, char **argv, struct err *e);
 /* What `assay slurm` does with a command, "grade ..." say: plans it below dir (NULL: OUTPUT.plan, which goes in the end), makes its
  * jobs on the cluster, gathers. w NULL: no wishes. */
 struct plan_wishes;
-int slurm_command(const char *dir, int argc, char **argv, const struct plan_wishes *w,
-                  struct err *e);
+int command_slurm_run(const char *dir, int argc, char **argv, const struct plan_wishes *w,
+                      struct err *e);
 
 #endif

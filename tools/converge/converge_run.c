@@ -297,7 +297,7 @@ bool converge_run(const struct converge_options *opt, int argc, char **argv, jso
                   struct err *e)
 {
     struct run r = {.opt = opt, .alpha = alpha_of_one(opt)};
-    double start = now_seconds();
+    double start = progress_seconds();
     if (!suite_load(opt->suite_dir, &r.suite, e))
         return false;
     json_t *root = claim_result_new_results(argc, argv, opt->alpha, e), *convergence = json_array();
@@ -316,7 +316,7 @@ bool converge_run(const struct converge_options *opt, int argc, char **argv, jso
     if (ok) {
         json_object_set(root, "convergence", convergence);
         json_object_set_new(root, "seed", json_integer(opt->seed));
-        json_object_set_new(root, "seconds", json_real(now_seconds() - start));
+        json_object_set_new(root, "seconds", json_real(progress_seconds() - start));
         *results = json_incref(root);
     }
     json_decref(convergence);

@@ -142,7 +142,7 @@ bool noise_record_render(const struct reference_command *c, const struct suite_s
 {
     for (enum converge_engine k = 0; k < CONVERGE_NUM_ENGINES; k++) {
         const char *engine = converge_engine_names[k];
-        double start = now_seconds();
+        double start = progress_seconds();
         if (!is_of(scene, k) || (c->engine != NULL && strcmp(c->engine, engine) != 0) ||
             (!c->fresh && (is_there(c->golden, scene, engine) || is_there(c->out, scene, engine))))
             continue;
@@ -157,7 +157,7 @@ bool noise_record_render(const struct reference_command *c, const struct suite_s
         if (!ok)
             return err_prefix(e, "%s, %s", scene->name, engine);
         printf("%s/%s/noise.json: %s, %.0f s\n", c->out, scene->name, engine,
-               now_seconds() - start);
+               progress_seconds() - start);
     }
     return true;
 }

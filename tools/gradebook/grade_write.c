@@ -294,7 +294,7 @@ static bool write_file(const char *out, const struct rubric *r, const struct ans
     if (of_class)
         ok = write_text(grades, name, o.f, e);
     else if (strcmp(name, "staff.html") == 0)
-        ok = staff_page(o.f, out, r, a, grades, e);
+        ok = student_page_for_staff(o.f, out, r, a, grades, e);
     else
         ok = student_page(o.f, out, grades, e);
     if (ok)

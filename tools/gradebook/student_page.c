@@ -281,8 +281,8 @@ bool student_page(FILE *f, const char *dir, const json_t *grade, struct err *e)
     return page(&(struct page){.f = f, .dir = dir, .grade = grade}, e);
 }
 
-bool staff_page(FILE *f, const char *dir, const struct rubric *r, const struct answer_key *a,
-                const json_t *grade, struct err *e)
+bool student_page_for_staff(FILE *f, const char *dir, const struct rubric *r,
+                            const struct answer_key *a, const json_t *grade, struct err *e)
 {
     return page(&(struct page){f, dir, grade, true, r, a}, e);
 }

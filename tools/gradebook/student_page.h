@@ -12,8 +12,9 @@
 NODISCARD bool student_page(FILE *f, const char *dir, const json_t *grade, struct err *e);
 
 /* The same for staff: everything, beside the references if rubric and answers are given (NULL: they are not). */
-NODISCARD bool staff_page(FILE *f, const char *dir, const struct rubric *r,
-                          const struct answer_key *a, const json_t *grade, struct err *e);
+NODISCARD bool student_page_for_staff(FILE *f, const char *dir, const struct rubric *r,
+                                      const struct answer_key *a, const json_t *grade,
+                                      struct err *e);
 
 /* What a page says first. May a check be seen now? Staff see all. */
 bool grade_summary_shows(const json_t *check, bool staff);

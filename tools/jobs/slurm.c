@@ -246,12 +246,12 @@ static bool wait_a_little(const struct cluster *c)
 
 static bool follow(struct cluster *c, struct err *e)
 {
-    double answered = now_seconds();
+    double answered = progress_seconds();
     for (;;) {
         struct err why = {""};
         int lost = 0;
         if (look_at_queue(c, &why)) {
-            answered = now_seconds();
+            answered = progress_seconds();
             look_at_artefacts(c);
             for (int k = 0; k < c->plan->num; k++) {
                 const struct job *j = &c->job[k];
@@ -265,7 +265,7 @@ static bool follow(struct cluster *c, struct err *e)
                                words);
             }
             tell(c);
-        } else if (now_seconds() - answered > patience_s) {
+        } else if (progress_seconds() - answered > patience_s) {
             *e = why;
             return err_prefix(e, "Slurm does not answer");
         }

@@ -293,7 +293,7 @@ enum fetch_result side_at(struct validation *v, struct side *s, int stage, int l
                  stage > 0 ? ", fresh seeds" : "");
         validate_log(v, s->scene->name, note);
     }
-    double begun = now_seconds();
+    double begun = progress_seconds();
     if (!make(v, s, stage, look, o)) {
         observed_free(o);
         /* A program that was stopped because the time is over has done nothing wrong. */
@@ -302,7 +302,7 @@ enum fetch_result side_at(struct validation *v, struct side *s, int stage, int l
         s->failed = true;
         return FETCH_FAILED;
     }
-    s->wall_s += now_seconds() - begun;
+    s->wall_s += progress_seconds() - begun;
     s->units += more;
     o->present = true;
     return FETCH_OK;

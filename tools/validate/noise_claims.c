@@ -459,7 +459,7 @@ json_t *noise_claims_run(const struct validate_options *opt, const struct suite_
     }
     if (!ok) {
         json_array_clear(rows);
-        bool late = now_seconds() >= deadline;
+        bool late = progress_seconds() >= deadline;
         json_t *row = bare_row(s, ours[0],
                                late ? BUDGET_SPENT " before its renders were done" : e.msg, false);
         if (late)

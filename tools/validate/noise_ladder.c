@@ -65,7 +65,7 @@ static bool render_rung(const struct noise_job *job, int rung, int first, int nu
                         struct moments *out, double *cpu_s, struct err *e)
 {
     static const char *const sobol[] = {"--sampler", "sobol", NULL};
-    double left = job->deadline - now_seconds();
+    double left = job->deadline - progress_seconds();
     if (left <= 0)
         return err_set(e, "the budget is spent");
     const struct path image = fs_path("%s/noise.exr", job->dir);

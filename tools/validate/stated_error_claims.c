@@ -36,7 +36,7 @@ static bool render_one(const struct validate_options *opt, const struct suite_sc
                        const struct share *share, double deadline, struct moments *out,
                        double *seconds, struct err *e)
 {
-    double left = deadline - now_seconds();
+    double left = deadline - progress_seconds();
     if (left <= 0)
         return err_set(e, "the budget is spent");
     const struct path image = image_path(opt, s);
@@ -234,7 +234,7 @@ json_t *stated_error_run(const struct validate_options *opt, const struct suite_
     for (int k = 0; k < done; k++)
         moments_free(&render[k]);
     free(render);
-    if (!ok && now_seconds() >= deadline)
+    if (!ok && progress_seconds() >= deadline)
         return json_pack("{ss,ss,sb,ss,ss}", "scene", s->name, "engine", "pathtracer", "passed", 0,
                          "verdict", verdict_name(VERDICT_INCONCLUSIVE), "error",
                          BUDGET_SPENT " before its renders were done");

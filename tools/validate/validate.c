@@ -89,13 +89,13 @@ static void collect(const struct validation *v, json_t *root)
             json_array_append(t->a != NULL ? json_object_get(root, "claims") : consistency,
                               t->result);
     }
-    json_object_set_new(root, "seconds", json_real(now_seconds() - v->start));
+    json_object_set_new(root, "seconds", json_real(progress_seconds() - v->start));
 }
 
 /* If it is time again. */
 static bool show_so_far(struct validation *v, const json_t *root, struct err *e)
 {
-    if (!(v->opt->show_every_s > 0) || now_seconds() < v->shown + v->opt->show_every_s)
+    if (!(v->opt->show_every_s > 0) || progress_seconds() < v->shown + v->opt->show_every_s)
         return true;
     json_t *copy = json_copy((json_t *)root), *claims = json_array();
     bool ok = true;
@@ -110,7 +110,7 @@ static bool show_so_far(struct validation *v, const json_t *root, struct err *e)
         ok = v->opt->show(copy, v->opt, e);
     }
     json_decref(copy);
-    v->shown = now_seconds();
+    v->shown = progress_seconds();
     return ok;
 }
 
@@ -295,8 +295,8 @@ bool validate(const struct validate_options *opt, int argc, char **argv, json_t 
               struct err *e)
 {
     struct validation v = {.opt = opt,
-                           .start = now_seconds(),
-                           .shown = now_seconds(),
+                           .start = progress_seconds(),
+                           .shown = progress_seconds(),
                            .sequence = sequence_of(opt),
                            .lock = PTHREAD_MUTEX_INITIALIZER};
     json_t *root = NULL, *cannot = json_array();

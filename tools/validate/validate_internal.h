@@ -89,7 +89,7 @@ struct validation {
         left_out; /* {reference: in how many scenes it cannot be had with the engine's filter}; NULL: that is the box of one pixel */
     const struct alpha_spending *sequence;
     int stages;
-    double start, deadline; /* of now_seconds(); deadline INFINITY: none */
+    double start, deadline; /* of progress_seconds(); deadline INFINITY: none */
     double shown;           /* when the last look so far was shown, or the start */
     double alpha;           /* of one claim */
 };
@@ -138,7 +138,7 @@ bool claim_run_differs(const struct claim_run *t);
 void claim_run_free(struct claim_run *t);
 
 /* Renders the scene as its consistency asks, below out_dir, and judges. A new reference; NULL only out
- * of memory. deadline: of now_seconds(), or INFINITY; what is not done by then is INCONCLUSIVE, with
+ * of memory. deadline: of progress_seconds(), or INFINITY; what is not done by then is INCONCLUSIVE, with
  * an "error" that says so. */
 json_t *stated_error_run(const struct validate_options *opt, const struct suite_scene *s,
                          double alpha, double deadline);

@@ -7,7 +7,7 @@
 
 double validate_time_left(const struct validation *v)
 {
-    return v->deadline - now_seconds();
+    return v->deadline - progress_seconds();
 }
 
 void validate_log(struct validation *v, const char *scene, const char *what)

@@ -24,7 +24,7 @@ TEST(known_answers)
     };
     for (size_t i = 0; i < sizeof kat / sizeof kat[0]; i++) {
         uint32_t out[4];
-        philox4x32(kat[i].counter, kat[i].key, kat[i].rounds, out);
+        sampler_philox4x32(kat[i].counter, kat[i].key, kat[i].rounds, out);
         assert_memory_equal(out, kat[i].expected, sizeof out);
     }
 }
