@@ -181,11 +181,12 @@ if env PATH=/nowhere "$assay" reproduce golden/12_point_plane/cycles.exr >"$tmp/
 else
     echo "ok reproduce: a reference without its engine"
 fi
-stored=$(sed -n 's/.*"version": "\(Blender [0-9.]*\)".*/\1/p' golden/12_point_plane/manifest.json | head -n 1)
-if [ "$(blender --version 2>/dev/null | head -n 1)" = "$stored" ]; then
+# Of one that is made here: on other processors Blender's bits are others.
+if command -v blender >/dev/null; then
+    "$assay" reference --only 12_point_plane --engine cycles --fresh --seed 7 -o "$tmp/golden" >/dev/null 2>&1
     expect "a reference by Cycles" 0 "the same bits in all" "$tmp/golden/12_point_plane/cycles.exr"
 else
-    echo "skip reproduce: a reference by Cycles (needs the $stored that made it)"
+    echo "skip reproduce: a reference by Cycles (needs Blender)"
 fi
 
 # What an interrupted render says to go on with, also behind a "--".

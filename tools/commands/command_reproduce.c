@@ -60,7 +60,7 @@ int command_reproduce(int argc, char **argv, struct err *e)
     printf("made again by: %s\n", r.command);
     if (r.made_by[0] != '\0' && strcmp(r.made_by, assay_version) != 0)
         printf("it is of version %s, this is %s\n", r.made_by, assay_version);
-    if (r.note[0] != '\0')
+    if (!same && r.note[0] != '\0')
         puts(r.note);
     reproduced_free(&r);
     return same ? 0 : 1;

@@ -257,7 +257,7 @@ static bool directory_of(const char *path, const char *scene, const char *engine
     return true;
 }
 
-/* By which engine it was made then, where it is another one now: that may be why it differs. */
+/* What may be why it differs: another engine than then, or another processor, whose instructions round otherwise. */
 static void compare_engines(const json_t *then, const json_t *now, struct reproduced *out)
 {
     const char *a = member_text(then, "version"), *b = member_text(now, "version");
@@ -265,6 +265,10 @@ static void compare_engines(const json_t *then, const json_t *now, struct reprod
         snprintf(out->note, sizeof out->note, "the reference is by %.100s, this is %.100s", a, b);
     else if (strcmp(member_text(then, "binary_sha256"), member_text(now, "binary_sha256")) != 0)
         snprintf(out->note, sizeof out->note, "the reference is by another build of %.100s", a);
+    else
+        snprintf(out->note, sizeof out->note,
+                 "it is the same %.100s, which may round otherwise on another kind of processor",
+                 a);
 }
 
 static bool render_golden(const struct suite_scene *scene, const struct suite_reference *ref,
