@@ -1,5 +1,8 @@
 #include "claim_result.h"
 
+#include "json_shape.h"
+
+#include "reference/base/json_node.h"
 #include "reference/base/utc_date.h"
 #include "renderer/base/shell_quote.h"
 #include "renderer/base/version.h"
@@ -126,6 +129,121 @@ bool claim_result_add_observations(json_t *claim, const char *side, const struct
         n = fmin(n, moments_n(m, p));
     return json_object_update_new(claim, json_pack("{s+:f, s+:s, s+:f}", "n_", side, n, "unit_",
                                                    side, m->unit, "spp_", side, m->spp)) == 0;
+}
+
+static const struct shape cost_shape = {.names = {[IS_NUMBER] = "a b"}};
+static const struct shape look_shape = {
+    .names = {[IS_TEXT] = "verdict", [IS_NUMBER] = "n_a n_b alpha", [IS_COUNT] = "stage"}};
+
+/* A claim that could not be judged has these and no more. */
+static const struct shape any_claim_shape = {
+    .names = {[IS_TEXT] = "scene a b expected title? detects? blind_to? error? quantity? rerun?",
+              [IS_NUMBER] = "alpha_claim? alpha_spent?",
+              [IS_COUNT] = "stages?",
+              [IS_BOOLEAN] = "passed"},
+    .part = {{"cost_s?", &cost_shape, PART_OBJECT}, {"looks?", &look_shape, PART_LIST}}};
+
+static const struct shape worst_tile_shape = {
+    .names = {[IS_NUMBER] = "difference t", [IS_COUNT] = "x y width height", [IS_INTERVAL] = "ci"}};
+static const struct shape worst_shape = {.names = {[IS_NUMBER] = "difference t",
+                                                   [IS_COUNT] = "x y width height channel",
+                                                   [IS_INTERVAL] = "ci"}};
+static const struct shape statistic_shape = {
+    .names = {[IS_TEXT] = "name what", [IS_NUMBER] = "share log10_p", [IS_COUNT] = "num_tests"}};
+static const struct shape hint_shape = {
+    .names = {[IS_TEXT] = "name unit", [IS_NUMBER] = "removed amount"}};
+static const struct shape variance_ratio_shape = {
+    .names = {[IS_NUMBER] = "ratio", [IS_INTERVAL] = "ci"}};
+static const struct shape rays_shape = {.names = {[IS_NUMBER] = "rays box_tests primitive_tests"}};
+static const struct shape files_shape = {.names = {[IS_TEXT] = "a b z relative"}};
+
+static const struct shape judged_shape = {
+    .names =
+        {[IS_TEXT] = "quantity verdict reason class? unit_b? version_b?",
+         [IS_NUMBER] =
+             "alpha margin_global margin_tile difference log10_p mdb_global mdb_tile rms_bias extra_factor n_a? n_b? spp_b? seconds_a? seconds_b?",
+         [IS_COUNT] = "tile num_tests tiles_x tiles_y seed_a?",
+         [IS_BOOLEAN] = "skew_limited",
+         [IS_INTERVAL] = "ci accept_mdb?",
+         [IS_TRIPLE] = "channel_difference",
+         [IS_COUNTS] = "seeds_b?"},
+    .part = {{"worst_tile", &worst_tile_shape, PART_OBJECT},
+             {"worst", &worst_shape, PART_OBJECT},
+             {"statistics", &statistic_shape, PART_LIST_OF_1},
+             {"files", &files_shape, PART_OBJECT},
+             {"hint?", &hint_shape, PART_OBJECT},
+             {"variance_ratio?", &variance_ratio_shape, PART_OBJECT},
+             {"rays_a?", &rays_shape, PART_OBJECT}}};
+
+/* One number, or null where a tile has no noise and so no test, for each tile. */
+static bool check_tiles(const json_t *claim, const char *name, size_t num, const char *where,
+                        struct err *e)
+{
+    const json_t *v = json_object_get(claim, name);
+    if (v == NULL)
+        return err_set(e, "%s: '%s' is missing", where, name);
+    if (!json_is_array(v) || json_array_size(v) != num)
+        return err_set(e, "%s: '%s' is not an array of tiles_x * tiles_y = %zu numbers", where,
+                       name, num);
+    for (size_t i = 0; i < num; i++) {
+        const json_t *x = json_array_get(v, i);
+        if (!json_is_number(x) && !json_is_null(x))
+            return err_set(e, "%s: '%s' has an element %zu that is not a number", where, name, i);
+    }
+    return true;
+}
+
+static bool check_judged(const json_t *claim, enum verdict expected, const char *where,
+                         struct err *e)
+{
+    if (!json_shape_check(claim, &judged_shape, where, e))
+        return false;
+    json_int_t tiles_x = json_integer_value(json_object_get(claim, "tiles_x"));
+    json_int_t tiles_y = json_integer_value(json_object_get(claim, "tiles_y"));
+    if (tiles_x < 1 || tiles_y < 1 || tiles_x > 65536 || tiles_y > 65536)
+        return err_set(e, "%s: 'tiles_x' or 'tiles_y' is not from 1 to 65536", where);
+    if (json_integer_value(json_object_get(claim, "tile")) < 1)
+        return err_set(e, "%s: 'tile' is not 1 or more", where);
+    if (json_number_value(json_object_get(claim, "margin_global")) < 0 ||
+        json_number_value(json_object_get(claim, "margin_tile")) < 0)
+        return err_set(e, "%s: a margin is below 0", where);
+    size_t num_tiles = (size_t)tiles_x * (size_t)tiles_y;
+    if (!check_tiles(claim, "tile_log10_p", num_tiles, where, e) ||
+        !check_tiles(claim, "tile_t", num_tiles, where, e))
+        return false;
+    if (json_integer_value(json_object_get(json_object_get(claim, "worst"), "channel")) > 3)
+        return err_set(e, "%s: 'worst.channel' is not from 0 to 3", where);
+
+    enum verdict verdict;
+    const char *name = member_text(claim, "verdict");
+    if (!verdict_parse(name, &verdict))
+        return err_set(e, "%s: 'verdict' is unknown: '%s'", where, name);
+    bool enough = member_number(claim, "mdb_global") <= member_end(claim, "accept_mdb", 0) &&
+                  member_number(claim, "mdb_tile") <= member_end(claim, "accept_mdb", 1);
+    bool passes = verdict == expected && (verdict != VERDICT_NOTHING_FOUND || enough);
+    if (json_is_true(json_object_get(claim, "passed")) != passes)
+        return err_set(e, "%s: 'passed' contradicts 'verdict' and 'expected'", where);
+    return true;
+}
+
+bool claim_result_check(const json_t *claim, const char *where, struct err *e)
+{
+    if (!json_is_object(claim))
+        return err_set(e, "%s: not an object", where);
+    if (!json_shape_check(claim, &any_claim_shape, where, e))
+        return false;
+    enum verdict expected;
+    const char *name = member_text(claim, "expected"), *verdict = member_text(claim, "verdict");
+    if (!verdict_parse(name, &expected))
+        return err_set(e, "%s: 'expected' is unknown: '%s'", where, name);
+    if (json_object_get(claim, "error") == NULL)
+        return check_judged(claim, expected, where, e);
+    if (json_is_true(json_object_get(claim, "passed")))
+        return err_set(e, "%s: has an 'error' and yet 'passed'", where);
+    if (json_object_get(claim, "verdict") != NULL &&
+        (verdict == NULL || strcmp(verdict, verdict_name(VERDICT_INCONCLUSIVE)) != 0))
+        return err_set(e, "%s: has an 'error' and yet a 'verdict' that is not INCONCLUSIVE", where);
+    return true;
 }
 
 /* "2 x AMD EPYC ...", or only the number where /proc does not say. */

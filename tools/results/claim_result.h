@@ -1,4 +1,4 @@
-/* One claim of results.json (results.h) from what was compared. */
+/* One claim of results.json (results.h): made from what was compared, and checked when it is read. */
 #ifndef ASSAY_CLAIM_RESULT_H
 #define ASSAY_CLAIM_RESULT_H
 
@@ -27,6 +27,9 @@ json_t *claim_result_not_judged(const struct claim_context *c, const char *error
 
 /* Adds how often and by what a side was observed: n, unit, spp (side "a" or "b"). */
 bool claim_result_add_observations(json_t *claim, const char *side, const struct moments *m);
+
+/* Has a claim of a file all that results.h promises? The line begins with `where`. */
+NODISCARD bool claim_result_check(const json_t *claim, const char *where, struct err *e);
 
 /* A new results object with everything but claims: command line (a verb and its arguments, NULL at argv[argc]; in words that
  * shell_quote_split() reads back), date, machine. NULL with a line if an argument is no UTF-8, and out of memory. */
