@@ -291,13 +291,10 @@ static bool carry_rates(const struct grading *g, int set, const struct rubric_ch
                         struct result *out, struct err *e)
 {
     const struct rubric_image *p = &g->r->image[c->images[0]];
-    const struct moments *ours = answer_key_counts(g->a, set, c->images[0]);
     struct rate_image rates;
     struct err why;
-    if (g->h->made[c->images[0]].rates[0] == '\0')
-        return true;
-    if (!rate_image_read(g->h->made[c->images[0]].rates, p->width, p->height, p->spp, c->batch,
-                         ours->n, &rates, &why))
+    if (!rate_image_read(g->h->made[c->images[0]].rates, p, c->batch,
+                         answer_key_counts(g->a, set, c->images[0]), &rates, &why))
         return !err_is_of_memory(&why) || err_set(e, "%s", why.msg);
     double v = rates.more > -1 ? log1p(rates.more) : -INFINITY,
            odd = rates.odd / fmax(1, rates.pixels);

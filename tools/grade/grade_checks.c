@@ -518,7 +518,6 @@ static bool check_rates(struct work *w, struct result *out, struct err *e)
 {
     const struct rubric_check *c = w->check;
     const struct made *made = &w->g->h->made[c->images[0]];
-    const struct moments *ours = answer_key_counts(w->g->a, w->set, c->images[0]);
     struct rate_image rates;
     struct err why;
     snprintf(
@@ -529,8 +528,8 @@ static bool check_rates(struct work *w, struct result *out, struct err *e)
         snprintf(out->seen, sizeof out->seen, "there is no rate image");
         return true;
     }
-    if (!rate_image_read(made->rates, student(w, 0)->width, student(w, 0)->height,
-                         image_of(w, 0)->spp, c->batch, ours->n, &rates, &why)) {
+    if (!rate_image_read(made->rates, image_of(w, 0), c->batch,
+                         answer_key_counts(w->g->a, w->set, c->images[0]), &rates, &why)) {
         if (err_is_of_memory(&why))
             return err_set(e, "%s", why.msg);
         snprintf(out->seen, sizeof out->seen, "the rate image: %.370s", why.msg);
@@ -562,9 +561,8 @@ void grade_checks_rates(const struct grading *g, int set, const struct rubric_ch
     struct stopping by[NUM_STOPPING_KINDS];
     struct rate_image rates;
     struct err why; /* which has been said */
-    if (g->h->made[image].rates[0] == '\0' ||
-        !rate_image_read(g->h->made[image].rates, p->width, p->height, p->spp, c->batch,
-                         answer_key_counts(g->a, set, image)->n, &rates, &why) ||
+    if (!rate_image_read(g->h->made[image].rates, p, c->batch, answer_key_counts(g->a, set, image),
+                         &rates, &why) ||
         !stopping_rule_samples(p, &g->h->image[image], answer_key_image(g->a, set, image), by,
                                &why))
         return;
@@ -648,7 +646,7 @@ static bool expect_noise(const struct work *w, struct err *e)
         double *count = calloc((size_t)s->width * (size_t)s->height, sizeof *count);
         if (count == NULL)
             return err_set(e, "out of memory");
-        if (rate_image_counts(made->rates, s->width, s->height, p->spp, count, &no_rates))
+        if (rate_image_counts(made->rates, p, count, &no_rates))
             scale_noise(s, count, p->spp);
         free(count);
     }

@@ -2,7 +2,8 @@
 #ifndef ASSAY_RATE_IMAGE_H
 #define ASSAY_RATE_IMAGE_H
 
-#include "renderer/base/err.h"
+#include "renderer/image/moments.h"
+#include "tools/submission/rubric.h"
 
 struct rate_image {
     double pixels,
@@ -12,13 +13,14 @@ struct rate_image {
     double more, sd; /* mean over that of `expected`, less 1, and its standard deviation */
 };
 
-/* expected: samples of each pixel in a render of ours (they hardly depend on each other: the difference of two such
- * counts varies from pixel to pixel by noise alone). Fails on what is no image of that size, and where batches are too small against `most` to tell apart. */
-NODISCARD bool rate_image_read(const char *path, int width, int height, int most, int batch,
-                               const double *expected, struct rate_image *out, struct err *e);
+/* Of an image of the rubric. ours: n is the samples of each pixel in a render of ours (they hardly depend on each other: the
+ * difference of two such counts varies from pixel to pixel by noise alone). Fails on what is no image of that size, and where batches
+ * are too small against all samples to tell apart. */
+NODISCARD bool rate_image_read(const char *path, const struct rubric_image *p, int batch,
+                               const struct moments *ours, struct rate_image *out, struct err *e);
 
 /* Samples of each pixel by its colour alone, 1 at least. */
-NODISCARD bool rate_image_counts(const char *path, int width, int height, int most, double *count,
+NODISCARD bool rate_image_counts(const char *path, const struct rubric_image *p, double *count,
                                  struct err *e);
 
 #endif

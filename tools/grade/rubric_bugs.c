@@ -138,7 +138,7 @@ static bool expect_mean_over_all(const struct rubric_image *p, const char *rates
     double *count = calloc((size_t)p->width * (size_t)p->height, sizeof *count);
     if (count == NULL)
         return err_set(e, "out of memory");
-    bool known = rate_image_counts(rates, p->width, p->height, p->spp, count, &why);
+    bool known = rate_image_counts(rates, p, count, &why);
     for (int i = 0; known && i < correct->columns * correct->rows; i++) {
         int x0 = i % correct->columns * correct->cell, y0 = i / correct->columns * correct->cell;
         double taken = 0;

@@ -173,10 +173,8 @@ static bool count_samples(const struct rubric *r, int image, const struct answer
     const struct rubric_image *p = &r->image[image];
     struct rate_image rates;
     struct err why;
-    if (made->rates[0] == '\0')
-        return true;
-    if (!rate_image_read(made->rates, p->width, p->height, p->spp, rates_check(r, image)->batch,
-                         right->as_asked.n, &rates, &why)) /* its check has said so */
+    if (!rate_image_read(made->rates, p, rates_check(r, image)->batch, &right->as_asked, &rates,
+                         &why)) /* its check has said so */
         return !err_is_of_memory(&why) || err_set(e, "%s", why.msg);
     if (rates.odd > most_odd * rates.pixels) /* not what it stands for */
         return true;

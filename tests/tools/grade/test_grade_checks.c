@@ -634,14 +634,16 @@ TEST(rates_are_whole_batches_or_not)
     const char *path = test_path("rate.png");
     struct rate_image r;
     struct err e;
-    static double ours[PIXELS];
+    static double n[PIXELS];
+    const struct moments ours = {.n = n};
+    struct rubric_image image = {.width = WIDTH, .height = HEIGHT, .spp = 64};
     for (size_t p = 0; p < PIXELS; p++) {
         const uint8_t quarter[3] = {0, 127, 127}, all[3] = {255, 0, 0}, odd[3] = {0, 60, 195};
-        ours[p] = p < 1024 ? 16 : 64;
+        n[p] = p < 1024 ? 16 : 64;
         memcpy(rgb8 + 3 * p, p < 1024 ? quarter : p < 3000 ? all : odd, 3);
     }
     assert_true(image_write_png(path, WIDTH, HEIGHT, rgb8, &e));
-    assert_true(rate_image_read(path, WIDTH, HEIGHT, 64, 16, ours, &r, &e));
+    assert_true(rate_image_read(path, &image, 16, &ours, &r, &e));
     assert_true(r.odd == PIXELS - 3000);
     assert_true(r.early == 1024 + PIXELS - 3000);
     /* The odd ones (rate .118 of 64 is 7.5) are nearest to 16: 72 pixels have 48 too few. */
@@ -650,8 +652,10 @@ TEST(rates_are_whole_batches_or_not)
     assert_true(fabs(r.mean - mean) < 1e-9 && fabs(r.more - (mean / right - 1)) < 1e-9);
     assert_true(fabs(r.sd * right - 48 * sqrt(72.0 / PIXELS * (1 - 72.0 / PIXELS) / PIXELS)) <
                 1e-9);
-    assert_false(rate_image_read(path, 32, 32, 64, 16, ours, &r, &e));
-    assert_false(rate_image_read(path, WIDTH, HEIGHT, 64000, 16, ours, &r, &e));
+    image.spp = 64000;
+    assert_false(rate_image_read(path, &image, 16, &ours, &r, &e));
+    image = (struct rubric_image){.width = 32, .height = 32, .spp = 64};
+    assert_false(rate_image_read(path, &image, 16, &ours, &r, &e));
 }
 
 /* A pixel of relative variance v stops after (1.96/0.2)^2 v samples, 96 v: as noisy as ours it does, 4 times as noisy it takes all
