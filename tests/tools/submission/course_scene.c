@@ -1,7 +1,9 @@
 #include "course_scene.h"
+#include "renderer/base/fs.h"
 #include "tests/support/test.h"
 
 #include <libxml/parser.h>
+#include <libxml/xpathInternals.h>
 #include <math.h>
 
 enum { MOST = 1 << 17, LEAF = 4 };
@@ -12,197 +14,143 @@ struct primitive {
 
 /* One scene. Rules are told by their first breach. */
 struct walk {
-    xmlDoc *doc;
+    xmlXPathContext *xpath;
     char breach[300];
-    int num_cameras, num_lights, num_areas, num_lit, num_emissive;
     struct primitive *primitive;
     int num_primitives;
 };
 
+/* What XPath [XML Path Language 1.0] can say of a scene: whatever is found breaks the rule. An id has its # here, so that references
+ * are equal to it; numbers() is how many a text has. */
+#define CGL "extra/technique[@profile = 'CGL']"
+/* Of a light: what it is by that, else by the common technique. */
+#define KIND "(" CGL " | self::*[not(" CGL ")]/technique_common)/*[1]"
+/* Effects, and the geometry that has them. */
+#define DIFFUSE "profile_COMMON/technique/phong/diffuse/color"
+#define SHINING CGL "/emission"
+#define LIT                                                                                        \
+    CGL "[not(emission)] or "                                                                      \
+        "not(" CGL ") and not(starts-with(normalize-space(" DIFFUSE "), '0 0 0 '))"
+#define GEOMETRY_OF(effect)                                                                        \
+    "//node/instance_geometry[.//instance_material/@target = "                                     \
+    "//material[instance_effect/@url = //effect[" effect "]/@id]/@id]"
+
+static const struct {
+    const char *found, *rule;
+} rules[] = {
+    {"/*[not(self::COLLADA) or not(asset/up_axis = 'Z_UP')]", "a COLLADA document with Z_UP"},
+    {"/*[not(scene/instance_visual_scene/@url = //visual_scene/@id)]", "a visual scene"},
+    {"//visual_scene/node[not(@id and @name)]", "a node has an id and a name"},
+    {"//visual_scene/node[translate or rotate or scale or numbers(matrix) != 16]",
+     "a node is placed by one matrix of 16 numbers"},
+    {"//visual_scene/node[node or count(instance_camera | instance_light | instance_geometry) != 1 or "
+     "not(instance_camera/@url = //camera/@id or instance_light/@url = //light/@id or "
+     "instance_geometry/@url = //geometry/@id)]",
+     "a node shows one thing that is in the file"},
+    {"(//camera | //light | //geometry)[not(@id and @name)]",
+     "cameras, lights and geometries have an id and a name"},
+    {"//camera[not(optics/technique_common/perspective[yfov or aspect_ratio])]",
+     "a camera is a perspective with yfov or aspect_ratio"},
+    {"//visual_scene[count(node/instance_camera) != 1]", "one camera"},
+    {"//visual_scene[not(node/instance_light or $environment)]",
+     "a light: directions of the hemisphere are counted by lights"},
+    {"//extra/technique[not(@profile)]", "a technique without a profile"},
+    {"//light[not(" KIND "[self::area or self::point or self::directional or self::ambient]"
+     "[numbers(color) = 3])]",
+     "a light is area, point, directional or ambient, with a color"},
+    {"//light[" KIND "[self::point][numbers(constant_attenuation) != 1 or "
+     "numbers(linear_attenuation) != 1 or numbers(quadratic_attenuation) != 1]]",
+     "a point light has all three attenuations"},
+    {"//node/instance_geometry[not(bind_material/technique_common/instance_material/@target = "
+     "//material[@name and instance_effect/@url = //effect/@id]/@id)]",
+     "a material has id, name and effect"},
+    {"//profile_COMMON/technique[not(@sid)]", "a technique without a sid"},
+    {"//effect/" CGL "/*[not(self::emission or self::mirror or self::microfacet or "
+     "self::refraction or self::glass)]",
+     "a material of an unknown kind"},
+    {"//effect/" CGL "/*[self::emission and not(radiance) or self::mirror and not(reflectance) or "
+     "self::microfacet and not(alpha and eta and k) or "
+     "self::refraction and not(transmittance and roughness and ior) or "
+     "self::glass and not(transmittance and reflectance and roughness and ior)]",
+     "a material lacks one of its numbers"},
+    {"//visual_scene[" GEOMETRY_OF(LIT) " and count(" GEOMETRY_OF(
+         SHINING) ") > "
+                  "count(node/instance_light[@url = //light[" KIND "[self::area]]/@id])]",
+     "a mesh that shines on something has an area light"},
+    {"//geometry[not(mesh or " CGL "/sphere[numbers(radius) = 1])]",
+     "a geometry is a mesh or a sphere with a radius"},
+    {"//mesh/source[not(@id) or numbers(float_array) != float_array/@count]",
+     "a source has an id and as many numbers as it says"},
+    {"//mesh[count(polylist) != 1 or triangles or not(vertices/@id)]",
+     "a mesh has vertices with an id and one polylist"},
+    {"//polylist/input[not(@semantic = 'VERTEX' and @source = ../../vertices/@id or "
+     "@semantic = 'NORMAL' and @source = ../../source/@id)]",
+     "a polylist has VERTEX, of its mesh's vertices, and at most NORMAL"},
+    {"//polylist[not(input/@semantic = 'VERTEX' and ../vertices/input/@source = ../source/@id) or "
+     "input[not(@offset < count(../input))] or numbers(vcount) != @count or "
+     "numbers(p) != 3 * @count * count(input)]",
+     "a polylist has as many numbers as it says"},
+    {"//vcount[translate(normalize-space(.), ' 3', '') != '' or contains(., '33')]",
+     "of a polygon only the first three corners are seen"},
+};
+
 static bool breach(struct walk *w, const xmlNode *n, const char *rule)
 {
-    xmlChar *name = n != NULL ? xmlGetProp(n, BAD_CAST "id") : NULL;
-    snprintf(w->breach, sizeof w->breach, "<%s%s%s>: %s", n != NULL ? (const char *)n->name : "",
-             name != NULL ? " " : "", name != NULL ? (const char *)name : "", rule);
-    xmlFree(name);
+    xmlChar *id = xmlGetProp(n, BAD_CAST "id");
+    snprintf(w->breach, sizeof w->breach, "<%s %s>: %s", (const char *)n->name,
+             id != NULL ? (const char *)id : "", rule);
+    xmlFree(id);
     return false;
 }
 
-static bool has(const xmlNode *n, const char *attribute)
+/* The nodes that an expression finds, from n on; the caller frees. */
+static xmlXPathObject *find(const struct walk *w, const xmlNode *n, const char *expression)
 {
-    return xmlHasProp(n, BAD_CAST attribute) != NULL;
-}
-
-static bool is(const xmlNode *n, const char *name)
-{
-    return n->type == XML_ELEMENT_NODE && strcmp((const char *)n->name, name) == 0;
-}
-
-static xmlNode *next(xmlNode *n, const char *name)
-{
-    while (n != NULL && !is(n, name))
-        n = n->next;
-    return n;
-}
-
-/* By a path a/b/c of first children, as the starter code finds its way. */
-static xmlNode *at(const xmlNode *n, const char *path)
-{
-    char names[200];
-    snprintf(names, sizeof names, "%s", path);
-    char *rest, *name = strtok_r(names, "/", &rest);
-    xmlNode *found = (xmlNode *)n;
-    for (; found != NULL && name != NULL; name = strtok_r(NULL, "/", &rest))
-        found = next(found->children, name);
+    xmlXPathSetContextNode((xmlNode *)n, w->xpath);
+    xmlXPathObject *found = xmlXPathEval(BAD_CAST expression, w->xpath);
+    if (found == NULL)
+        fail_msg("%s", expression);
     return found;
 }
 
-static xmlNode *by_id(xmlNode *n, const char *id)
+/* The first; NULL: none. */
+static xmlNode *first(const struct walk *w, const xmlNode *n, const char *expression)
 {
-    for (; n != NULL; n = n->next) {
-        xmlChar *own = n->type == XML_ELEMENT_NODE ? xmlGetProp(n, BAD_CAST "id") : NULL;
-        bool same = own != NULL && strcmp((const char *)own, id) == 0;
-        xmlFree(own);
-        xmlNode *below = same ? n : by_id(n->children, id);
-        if (below != NULL)
-            return below;
-    }
-    return NULL;
+    xmlXPathObject *found = find(w, n, expression);
+    xmlNode *node = xmlXPathNodeSetItem(found->nodesetval, 0);
+    xmlXPathFreeObject(found);
+    return node;
 }
 
-/* NULL: no such attribute, or nothing of that id. */
-static xmlNode *target(const struct walk *w, const xmlNode *n, const char *attribute)
+/* How many numbers a text has. */
+static int numbers_of(const char *text, double *out, int most)
 {
-    xmlChar *url = n != NULL ? xmlGetProp(n, BAD_CAST attribute) : NULL;
-    xmlNode *found = url != NULL && url[0] == '#'
-                         ? by_id(xmlDocGetRootElement(w->doc), (const char *)url + 1)
-                         : NULL;
-    xmlFree(url);
-    return found;
-}
-
-/* How many numbers it has; NULL: none. */
-static int numbers(const xmlNode *n, double *out, int most)
-{
-    xmlChar *text = n != NULL ? xmlNodeGetContent(n) : NULL;
     int num = 0;
-    char *p = (char *)text, *end = p;
-    for (; p != NULL && num < most; p = end, num++) {
-        out[num] = strtod(p, &end);
-        if (end == p)
+    char *end;
+    for (; num < most; text = end, num++) {
+        out[num] = strtod(text, &end);
+        if (end == text)
             break;
     }
+    return num;
+}
+
+static int numbers(const struct walk *w, const xmlNode *n, const char *expression, double *out,
+                   int most)
+{
+    xmlChar *text = xmlNodeGetContent(first(w, n, expression));
+    int num = text != NULL ? numbers_of((const char *)text, out, most) : 0;
     xmlFree(text);
     return num;
 }
 
-static double attribute(const xmlNode *n, const char *name)
+static void numbers_in_xpath(xmlXPathParserContext *c, int arguments)
 {
-    xmlChar *text = xmlGetProp(n, BAD_CAST name);
-    double v = text != NULL ? strtod((const char *)text, NULL) : -1;
+    static double ignored[MOST];
+    assert_int_equal(arguments, 1);
+    xmlChar *text = xmlXPathPopString(c);
+    xmlXPathReturnNumber(c, numbers_of((const char *)text, ignored, MOST));
     xmlFree(text);
-    return v;
-}
-
-/* The first extra's technique CGL. Every technique before it needs its profile. */
-static bool find_cgl(struct walk *w, const xmlNode *n, xmlNode **out)
-{
-    for (*out = at(n, "extra/technique"); *out != NULL; *out = next((*out)->next, "technique")) {
-        xmlChar *profile = xmlGetProp(*out, BAD_CAST "profile");
-        bool cgl = profile != NULL && strcmp((const char *)profile, "CGL") == 0,
-             any = profile != NULL;
-        xmlFree(profile);
-        if (!any)
-            return breach(w, n, "a technique without a profile");
-        if (cgl)
-            return true;
-    }
-    return true;
-}
-
-static bool has_numbers(const xmlNode *n, const char *path, int num)
-{
-    double v[8];
-    return numbers(at(n, path), v, 8) == num;
-}
-
-static bool walk_camera(struct walk *w, const xmlNode *n)
-{
-    const xmlNode *p = at(n, "optics/technique_common/perspective");
-    w->num_cameras++;
-    if (p == NULL || (at(p, "yfov") == NULL && at(p, "aspect_ratio") == NULL))
-        return breach(w, n, "a camera is a perspective with yfov or aspect_ratio");
-    return true;
-}
-
-static bool walk_light(struct walk *w, const xmlNode *n, const double *m)
-{
-    xmlNode *technique;
-    if (!find_cgl(w, n, &technique))
-        return false;
-    technique = technique != NULL ? technique : at(n, "technique_common");
-    xmlNode *kind = technique != NULL ? xmlFirstElementChild(technique) : NULL;
-    w->num_lights++;
-    if (kind == NULL ||
-        !(is(kind, "area") || is(kind, "point") || is(kind, "directional") ||
-          is(kind, "ambient")) ||
-        !has_numbers(kind, "color", 3))
-        return breach(w, n, "a light is area, point, directional or ambient, with a color");
-    if (is(kind, "point") && (!has_numbers(kind, "constant_attenuation", 1) ||
-                              !has_numbers(kind, "linear_attenuation", 1) ||
-                              !has_numbers(kind, "quadratic_attenuation", 1)))
-        return breach(w, n, "a point light has all three attenuations");
-    for (int i = 0; i < 3 && is(kind, "directional"); i++)
-        for (int k = 0; k < 3; k++)
-            if (fabs(m[4 * i + 3] * m[4 * k + 2] - m[4 * k + 3] * m[4 * i + 2]) > 1e-3)
-                return breach(w, n, "a directional light lies on its own axis");
-    w->num_areas += is(kind, "area");
-    return true;
-}
-
-static bool walk_material(struct walk *w, const xmlNode *node)
-{
-    static const struct {
-        const char *tag, *child[4];
-    } known[] = {{"emission", {"radiance"}},
-                 {"mirror", {"reflectance"}},
-                 {"microfacet", {"alpha", "eta", "k"}},
-                 {"refraction", {"transmittance", "roughness", "ior"}},
-                 {"glass", {"transmittance", "reflectance", "roughness", "ior"}}};
-    const xmlNode *m =
-        target(w, at(node, "instance_geometry/bind_material/technique_common/instance_material"),
-               "target");
-    const xmlNode *effect = m != NULL ? target(w, at(m, "instance_effect"), "url") : NULL;
-    if (effect == NULL || !has(m, "id") || !has(m, "name"))
-        return breach(w, node, "a material has id, name and effect");
-    for (xmlNode *t = at(effect, "profile_COMMON/technique"); t != NULL;
-         t = next(t->next, "technique"))
-        if (!has(t, "sid"))
-            return breach(w, effect, "a technique without a sid");
-    xmlNode *cgl;
-    if (!find_cgl(w, effect, &cgl))
-        return false;
-    for (xmlNode *tag = cgl != NULL ? xmlFirstElementChild(cgl) : NULL; tag != NULL;
-         tag = xmlNextElementSibling(tag)) {
-        size_t i = 0;
-        while (i < sizeof known / sizeof *known && !is(tag, known[i].tag))
-            i++;
-        if (i == sizeof known / sizeof *known)
-            return breach(w, effect, "a material of an unknown kind");
-        for (int c = 0; c < 4 && known[i].child[c] != NULL; c++)
-            if (at(tag, known[i].child[c]) == NULL)
-                return breach(w, effect, "a material lacks one of its numbers");
-    }
-    if (at(cgl, "emission") != NULL)
-        w->num_emissive++;
-    double color[4] = {0};
-    if (cgl == NULL) {
-        numbers(at(effect, "profile_COMMON/technique/phong/diffuse/color"), color, 4);
-        w->num_lit += color[0] + color[1] + color[2] > 0;
-    } else if (at(cgl, "emission") == NULL) {
-        w->num_lit++;
-    }
-    return true;
 }
 
 struct mesh {
@@ -312,62 +260,33 @@ static void add_triangles(struct walk *w, const struct mesh *m, const double *to
 
 static bool walk_mesh(struct walk *w, const xmlNode *g, const double *to)
 {
-    static double points[MOST], normals[MOST], index[MOST], count[MOST];
+    static double points[MOST], normals[MOST], index[MOST];
     static int corner[MOST], normal[MOST];
     static struct side side[MOST];
-    const xmlNode *mesh = at(g, "mesh"), *list = at(mesh, "polylist"),
-                  *vertices = at(mesh, "vertices");
     struct mesh m = {.p = points, .corner = corner, .normal = normal};
-    int stride = 0, vertex = -1, n = -1;
-    for (xmlNode *s = at(mesh, "source"); s != NULL; s = next(s->next, "source"))
-        if (!has(s, "id") ||
-            numbers(at(s, "float_array"), points, MOST) != attribute(at(s, "float_array"), "count"))
-            return breach(w, g, "a source has an id and as many numbers as it says");
-    if (list == NULL || next(list->next, "polylist") != NULL || at(mesh, "triangles") != NULL ||
-        vertices == NULL || !has(vertices, "id"))
-        return breach(w, g, "a mesh has vertices with an id and one polylist");
-    for (xmlNode *i = at(list, "input"); i != NULL; i = next(i->next, "input"), stride++) {
-        xmlChar *semantic = xmlGetProp(i, BAD_CAST "semantic");
-        const xmlNode *source = target(w, i, "source");
-        bool is_vertex = xmlStrEqual(semantic, BAD_CAST "VERTEX"),
-             is_normal = xmlStrEqual(semantic, BAD_CAST "NORMAL");
-        xmlFree(semantic);
-        if (source == NULL || (is_vertex && source != vertices) || !(is_vertex || is_normal))
-            return breach(w, g,
-                          "a polylist has VERTEX, of its mesh's vertices, and at most NORMAL");
-        *(is_vertex ? &vertex : &n) = (int)attribute(i, "offset");
-        if (is_normal && numbers(at(source, "float_array"), normals, MOST) > 0)
-            m.n = normals;
-    }
+    double stride, vertex, n = 0;
+    numbers(w, g, "mesh/polylist/@count", &stride, 1);
+    m.num_triangles = (int)stride;
+    numbers(w, g, "mesh/polylist/input[@semantic = 'VERTEX']/@offset", &vertex, 1);
+    if (numbers(w, g, "mesh/polylist/input[@semantic = 'NORMAL']/@offset", &n, 1) == 1 &&
+        numbers(w, g,
+                "mesh/source[@id = ../polylist/input[@semantic = 'NORMAL']/@source]/float_array",
+                normals, MOST) > 0)
+        m.n = normals;
     m.num_points =
-        numbers(at(target(w, at(vertices, "input"), "source"), "float_array"), points, MOST) / 3;
-    m.num_triangles = (int)attribute(list, "count");
-    if (m.num_points == 0 || vertex < 0 || vertex >= stride || n >= stride ||
-        numbers(at(list, "vcount"), count, MOST) != m.num_triangles ||
-        numbers(at(list, "p"), index, MOST) != 3 * m.num_triangles * stride)
-        return breach(w, g, "a polylist has as many numbers as it says");
-    for (int i = 0; i < m.num_triangles; i++)
-        if (count[i] != 3)
-            return breach(w, g, "of a polygon only the first three corners are seen");
+        numbers(w, g, "mesh/source[@id = ../vertices/input/@source]/float_array", points, MOST) / 3;
+    stride = numbers(w, g, "mesh/polylist/p", index, MOST) / (3.0 * m.num_triangles);
     for (int i = 0; i < 3 * m.num_triangles; i++) {
-        corner[i] = (int)index[i * stride + vertex];
-        normal[i] = n >= 0 ? (int)index[i * stride + n] : 0;
+        corner[i] = (int)index[(int)(i * stride + vertex)];
+        normal[i] = (int)index[(int)(i * stride + n)];
         assert_in_range(corner[i], 0, m.num_points - 1);
     }
     add_triangles(w, &m, to);
     return walk_sides(w, g, &m, side);
 }
 
-static bool walk_geometry(struct walk *w, const xmlNode *g, const double *m)
+static bool walk_sphere(struct walk *w, const xmlNode *g, double radius, const double *m)
 {
-    double radius;
-    xmlNode *cgl;
-    if (at(g, "mesh") != NULL)
-        return walk_mesh(w, g, m);
-    if (!find_cgl(w, g, &cgl))
-        return false;
-    if (cgl == NULL || numbers(at(cgl, "sphere/radius"), &radius, 1) != 1)
-        return breach(w, g, "a geometry is a mesh or a sphere with a radius");
     struct primitive *p = add_primitive(w);
     for (int k = 0; k < 3; k++) {
         int axis = k == 0 ? 0 : 3 - k;
@@ -382,31 +301,22 @@ static bool walk_geometry(struct walk *w, const xmlNode *g, const double *m)
     return true;
 }
 
+/* What a node places: a light that is directional, a sphere, a mesh. */
 static bool walk_node(struct walk *w, const xmlNode *n)
 {
-    static const char *const instances[] = {"instance_camera", "instance_light",
-                                            "instance_geometry"};
-    const xmlNode *what = NULL;
-    double m[17];
-    int num = 0, kind = 0;
-    if (!has(n, "id") || !has(n, "name"))
-        return breach(w, n, "a node has an id and a name");
-    if (at(n, "translate") != NULL || at(n, "rotate") != NULL || at(n, "scale") != NULL ||
-        numbers(at(n, "matrix"), m, 17) != 16)
-        return breach(w, n, "a node is placed by one matrix of 16 numbers");
-    for (int i = 0; i < 3; i++)
-        if (at(n, instances[i]) != NULL) {
-            what = target(w, at(n, instances[i]), "url");
-            kind = i;
-            num++;
-        }
-    if (num != 1 || what == NULL || at(n, "node") != NULL)
-        return breach(w, n, "a node shows one thing that is in the file");
-    if (!has(what, "id") || !has(what, "name"))
-        return breach(w, what, "cameras, lights and geometries have an id and a name");
-    return kind == 0   ? walk_camera(w, what)
-           : kind == 1 ? walk_light(w, what, m)
-                       : walk_material(w, n) && walk_geometry(w, what, m);
+    double m[16], radius;
+    numbers(w, n, "matrix", m, 16);
+    xmlChar *url = xmlGetProp(first(w, n, "*[@url]"), BAD_CAST "url");
+    const xmlNode *what = first(w, n, fs_path("//*[@id = '%s']", (const char *)url).s);
+    xmlFree(url);
+    for (int i = 0; i < 3 && first(w, what, KIND "[self::directional]") != NULL; i++)
+        for (int k = 0; k < 3; k++)
+            if (fabs(m[4 * i + 3] * m[4 * k + 2] - m[4 * k + 3] * m[4 * i + 2]) > 1e-3)
+                return breach(w, what, "a directional light lies on its own axis");
+    if (first(w, what, "mesh") != NULL)
+        return walk_mesh(w, what, m);
+    return numbers(w, what, CGL "/sphere/radius", &radius, 1) == 0 ||
+           walk_sphere(w, what, radius, m);
 }
 
 static double centre(const struct primitive *p, int axis)
@@ -442,38 +352,49 @@ static bool splits(struct primitive *p, int num)
     return few > 0 && few < num && splits(p, few) && splits(p + few, num - few);
 }
 
-static bool walk_scene(struct walk *w, bool has_environment)
+static bool walk_scene(struct walk *w, const xmlNode *root)
 {
-    const xmlNode *root = xmlDocGetRootElement(w->doc);
-    xmlChar *up = xmlNodeGetContent(at(root, "asset/up_axis"));
-    bool z_up = xmlStrEqual(up, BAD_CAST "Z_UP");
-    xmlFree(up);
-    if (!is(root, "COLLADA") || !z_up)
-        return breach(w, root, "a COLLADA document with Z_UP");
-    const xmlNode *scene = target(w, at(root, "scene/instance_visual_scene"), "url");
-    if (scene == NULL)
-        return breach(w, root, "a visual scene");
-    for (xmlNode *n = at(scene, "node"); n != NULL; n = next(n->next, "node"))
-        if (!walk_node(w, n))
-            return false;
-    if (w->num_cameras != 1)
-        return breach(w, scene, "one camera");
-    if (w->num_lights == 0 && !has_environment)
-        return breach(w, scene, "a light: directions of the hemisphere are counted by lights");
-    if (w->num_lit > 0 && w->num_emissive > w->num_areas)
-        return breach(w, scene, "a mesh that shines on something has an area light");
-    return splits(w->primitive, w->num_primitives) ||
-           breach(w, scene, "centres that no plane parts");
+    for (size_t i = 0; i < COUNT(rules); i++) {
+        const xmlNode *n = first(w, root, rules[i].found);
+        if (n != NULL)
+            return breach(w, n, rules[i].rule);
+    }
+    const xmlNode *scene = first(w, root, "//visual_scene");
+    xmlXPathObject *nodes = find(w, scene, "node");
+    bool ok = true;
+    for (int i = 0; ok && i < xmlXPathNodeSetGetLength(nodes->nodesetval); i++)
+        ok = walk_node(w, xmlXPathNodeSetItem(nodes->nodesetval, i));
+    xmlXPathFreeObject(nodes);
+    return ok && (splits(w->primitive, w->num_primitives) ||
+                  breach(w, scene, "centres that no plane parts"));
+}
+
+/* Without name spaces, and ids as references have them. */
+static void prepare(xmlNode *n)
+{
+    for (; n != NULL; n = n->next) {
+        xmlChar *id = n->type == XML_ELEMENT_NODE ? xmlGetProp(n, BAD_CAST "id") : NULL;
+        if (id != NULL)
+            xmlSetProp(n, BAD_CAST "id", BAD_CAST fs_path("#%s", (const char *)id).s);
+        xmlFree(id);
+        n->ns = NULL;
+        prepare(n->children);
+    }
 }
 
 const char *course_scene_breach(const char *text, bool has_environment)
 {
     static struct primitive primitive[MOST];
     static struct walk w;
-    w = (struct walk){.doc = xmlReadMemory(text, (int)strlen(text), "scene", NULL, XML_PARSE_NONET),
-                      .primitive = primitive};
-    assert_non_null(w.doc);
-    walk_scene(&w, has_environment);
-    xmlFreeDoc(w.doc);
+    xmlDoc *doc = xmlReadMemory(text, (int)strlen(text), "scene", NULL, XML_PARSE_NONET);
+    assert_non_null(doc);
+    prepare(xmlDocGetRootElement(doc));
+    w = (struct walk){.xpath = xmlXPathNewContext(doc), .primitive = primitive};
+    assert_non_null(w.xpath);
+    xmlXPathRegisterVariable(w.xpath, BAD_CAST "environment", xmlXPathNewBoolean(has_environment));
+    xmlXPathRegisterFunc(w.xpath, BAD_CAST "numbers", numbers_in_xpath);
+    walk_scene(&w, xmlDocGetRootElement(doc));
+    xmlXPathFreeContext(w.xpath);
+    xmlFreeDoc(doc);
     return w.breach;
 }
