@@ -5,8 +5,6 @@
 #include "povray_lamp.h"
 #include "povray_texture.h"
 
-#include "renderer/shading/bsdf.h"
-
 #include <assert.h>
 #include <errno.h>
 #include <string.h>

@@ -1,7 +1,5 @@
 #include "povray_glass.h"
 
-#include "renderer/shading/bsdf.h"
-
 #include <stdlib.h>
 #include <string.h>
 

@@ -1,7 +1,5 @@
 #include "povray_lamp.h"
 
-#include "renderer/shading/bsdf.h"
-
 #include <assert.h>
 #include <gsl/gsl_math.h>
 

@@ -5,7 +5,6 @@
 #include "povray_texture.h"
 
 #include "reference/suite/features.h"
-#include "renderer/shading/bsdf.h"
 #include "renderer/scene/environment.h"
 
 #include <assert.h>

@@ -1,6 +1,8 @@
-/* Scattering (bsdf.h) by lanes, which may be of different materials. Directions in the local frame. A new material has
- * a header of its own, lines in eval_lobes() and sample_lobes(), and its bit in the sets of kinds that it belongs to
- * (scene.h). */
+/* Scattering at a surface, by lanes, which may be of different materials. Directions are unit, point away from the
+ * surface, and stand in the local frame of the shading normal, which is turned to the side of wo: wo.z > 0. wi.z < 0 is
+ * light that comes through the surface. f is in sr^-1, without the cosine, and 0 for delta lobes, as is their density.
+ * A new material has a header of its own, lines in eval_lobes() and sample_lobes(), and its bit in the sets of kinds that
+ * it belongs to (scene.h). */
 #ifndef ASSAY_BSDF_SIMD_H
 #define ASSAY_BSDF_SIMD_H
 
@@ -40,12 +42,15 @@ INLINE void materials_gather(const float *record, const int32_t number[LANES], s
     m->reflectance = rgb_select(has_bits(m->bits, 1 << MATERIAL_PLASTIC), m->eta, m->reflectance);
 }
 
-/* struct bsdf_sample */
+/* Sampled directions. weight = f |cos(theta_i)| / pdf_w, so the caller multiplies and is done. pdf_w 0: nothing scatters
+ * (the path ends). */
 struct bsdf_samplev {
     vec3v wi;
     rgbv weight;
-    vf pdf_w, eta2;
-    vi delta;
+    vf pdf_w; /* per steradian; 1 if delta */
+    vf eta2; /* what the radiance behind a refracting boundary is divided by, (n_behind / n_here)^2; 1 else. It is in
+                 weight, and leaves it again where the path comes out. */
+    vi delta; /* one of the directions that light sampling cannot find */
 };
 
 INLINE rgbv mirror_reflectance(const struct materialv *m, vf cos_m)
@@ -177,8 +182,9 @@ INLINE void sample_plastic(const struct materialv *m, vi lanes, rgbv reflectance
     sample_mirror(mirrored, wo, rgb_scalev(m->k, 1 / mirror), s);
 }
 
-/* Directions for the lanes of the mask; the others' are of no use. number, bits and reflectance: of their
- * materials; front: a byte of 0 or 1 each. */
+/* Directions for the lanes of the mask; the others' are of no use. number, kinds and reflectance: of their materials;
+ * front: a byte of 0 or 1 each, is wo on the side that the scene's geometric normal points to, in front of glass, not
+ * inside it? u[0] and u[1] choose the direction, u[2] the part of the material. */
 INLINE void sample_lobes(const float *record, const int32_t number[LANES], vi kinds,
                          rgbv reflectance, const bool *front, unsigned mask, vec3v wo,
                          const vf u[4], struct bsdf_samplev *s)

@@ -1,6 +1,5 @@
 #include "scene_simd.h"
 
-#include "bsdf.h"
 #include "renderer/base/huge_alloc.h"
 #include "renderer/scene/shape.h"
 

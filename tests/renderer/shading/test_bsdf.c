@@ -8,7 +8,8 @@
  * the integral of f cos (z). Alpha 1e-4 for the whole file, Bonferroni over TESTS. n = 40000: a
  * roughness off by 15 % has a noncentrality of several hundred, power 1 - 1e-9; it is the negative
  * control in every row, for plastics the shares of the lobes exchanged. */
-#include "renderer/shading/bsdf.h"
+#include "bsdf.h"
+
 #include "renderer/shading/fresnel.h"
 #include "renderer/shading/microfacet.h"
 #include "renderer/math/sampler.h"

@@ -1,6 +1,6 @@
 #include "bsdf.h"
 
-#include "bsdf_simd.h"
+#include "renderer/shading/bsdf_simd.h"
 
 static struct materialv material_of(const struct material *m)
 {
