@@ -114,8 +114,10 @@ static bool put_metal(struct writer *w, uint32_t index, struct err *e)
 
 static bool check_material(const struct material *m, struct err *e)
 {
+    const unsigned expressed = 1u << MATERIAL_DIFFUSE | 1u << MATERIAL_MIRROR |
+                               1u << MATERIAL_GLASS | 1u << MATERIAL_MICROFACET;
     const char *why = NULL;
-    if (m->kind == MATERIAL_REFRACTION || m->kind == MATERIAL_PLASTIC)
+    if (!(1u << m->kind & expressed))
         why = features_material_names[m->kind];
     else if (m->kind == MATERIAL_GLASS && m->schlick)
         why = "Schlick's approximation";

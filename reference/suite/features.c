@@ -31,6 +31,29 @@ const char *const feature_names[NUM_FEATURES + 1] = {
     [FEATURE_TEXTURE] = "texture",
 };
 
+const char *const feature_texts[NUM_FEATURES] = {
+    [FEATURE_DIFFUSE] = "matt surfaces",
+    [FEATURE_MIRROR] = "a mirror",
+    [FEATURE_GLASS] = "glass",
+    [FEATURE_REFRACTION] = "a boundary that only refracts",
+    [FEATURE_SCHLICK] = "glass by Schlick's approximation",
+    [FEATURE_MICROFACET] = "rough metal (GGX)",
+    [FEATURE_BECKMANN] = "rough metal (Beckmann)",
+    [FEATURE_PLASTIC] = "highlights on matt surfaces",
+    [FEATURE_AREA] = "glowing surfaces",
+    [FEATURE_TWO_SIDED] = "surfaces that glow on both sides",
+    [FEATURE_POINT] = "a point light",
+    [FEATURE_SPOT] = "a spot light",
+    [FEATURE_FALLOFF] = "a light without inverse square falloff",
+    [FEATURE_DIRECTIONAL] = "a directional light",
+    [FEATURE_ENVIRONMENT] = "a sky",
+    [FEATURE_SPHERE] = "spheres",
+    [FEATURE_SMOOTH] = "shading normals",
+    [FEATURE_LENS] = "a lens",
+    [FEATURE_CLIP] = "a near or far plane",
+    [FEATURE_TEXTURE] = "textures",
+};
+
 static dvec3 wide(vec3 v)
 {
     return d3(v.x, v.y, v.z);

@@ -28,8 +28,15 @@ enum feature {
     FEATURE_TEXTURE, /* images on surfaces */
     NUM_FEATURES
 };
+/* Sets of features, of bits 1 << enum feature. */
+enum {
+    FEATURES_BOUNDARY = 1 << FEATURE_GLASS | 1 << FEATURE_REFRACTION | 1 << FEATURE_SCHLICK,
+    FEATURES_SPECULAR = 1 << FEATURE_MIRROR | FEATURES_BOUNDARY,
+    FEATURES_ROUGH_METAL = 1 << FEATURE_MICROFACET | 1 << FEATURE_BECKMANN
+};
 
 extern const char *const feature_names[NUM_FEATURES + 1]; /* ends with NULL */
+extern const char *const feature_texts[NUM_FEATURES];     /* for people */
 
 /* Bit 1 << enum feature of all that image needs. */
 unsigned features_of_scene(const struct scene *s, const struct camera *c);

@@ -35,27 +35,8 @@ enum {
     TILE_SIDE = 16
 };
 
-static const char *const fixed_names[NUM_FIXED] = {
-    [FEATURE_DIFFUSE] = "matt surfaces",
-    [FEATURE_MIRROR] = "a mirror",
-    [FEATURE_GLASS] = "glass",
-    [FEATURE_REFRACTION] = "a boundary that only refracts",
-    [FEATURE_SCHLICK] = "glass by Schlick's approximation",
-    [FEATURE_MICROFACET] = "rough metal (GGX)",
-    [FEATURE_BECKMANN] = "rough metal (Beckmann)",
-    [FEATURE_PLASTIC] = "highlights on matt surfaces",
-    [FEATURE_AREA] = "glowing surfaces",
-    [FEATURE_TWO_SIDED] = "surfaces that glow on both sides",
-    [FEATURE_POINT] = "a point light",
-    [FEATURE_SPOT] = "a spot light",
-    [FEATURE_FALLOFF] = "a light without inverse square falloff",
-    [FEATURE_DIRECTIONAL] = "a directional light",
-    [FEATURE_ENVIRONMENT] = "a sky",
-    [FEATURE_SPHERE] = "spheres",
-    [FEATURE_SMOOTH] = "shading normals",
-    [FEATURE_LENS] = "a lens",
-    [FEATURE_CLIP] = "a near or far plane",
-    [FEATURE_TEXTURE] = "textures",
+/* Of those that are no features. */
+static const char *const trait_texts[NUM_FIXED] = {
     [TRAIT_SPECULAR] = "a mirror, glass or refraction",
     [TRAIT_BOUNDARY] = "glass or refraction",
     [TRAIT_ROUGH] = "rough metal",
@@ -83,10 +64,9 @@ static const struct {
     int trait;
     unsigned of;
 } classes[] = {
-    {TRAIT_SPECULAR,
-     1u << FEATURE_MIRROR | 1u << FEATURE_GLASS | 1u << FEATURE_REFRACTION | 1u << FEATURE_SCHLICK},
-    {TRAIT_BOUNDARY, 1u << FEATURE_GLASS | 1u << FEATURE_REFRACTION | 1u << FEATURE_SCHLICK},
-    {TRAIT_ROUGH, 1u << FEATURE_MICROFACET | 1u << FEATURE_BECKMANN},
+    {TRAIT_SPECULAR, FEATURES_SPECULAR},
+    {TRAIT_BOUNDARY, FEATURES_BOUNDARY},
+    {TRAIT_ROUGH, FEATURES_ROUGH_METAL},
     {TRAIT_POINTLIKE, 1u << FEATURE_POINT | 1u << FEATURE_SPOT},
     {TRAIT_DELTA_LIGHT, 1u << FEATURE_POINT | 1u << FEATURE_SPOT | 1u << FEATURE_DIRECTIONAL},
 };
@@ -282,7 +262,7 @@ bool claim_traits_collect(const json_t *results, const char *suite_dir, struct t
     if (!differs)
         return true;
     for (int i = 0; i < NUM_FIXED; i++)
-        strcpy(out->name[i], fixed_names[i]);
+        strcpy(out->name[i], i < NUM_FEATURES ? feature_texts[i] : trait_texts[i]);
     out->claim = calloc(json_array_size(out->json), sizeof *out->claim);
     bool ok = (out->claim != NULL || err_set(e, "out of memory")) &&
               suite_load(suite_dir, &suite, e) && collect(&suite, out, e);
