@@ -48,7 +48,7 @@ score() { # SUBMISSION NAME SCORE
     chmod 755 submission/ours
     printf 'pathtracer: ours\n\tcp ours pathtracer\n' >submission/Makefile
     check "$2" source/run_autograder
-    check "$2: Gradescope's fields" "$fields" results/results.json
+    check "$2: Gradescope's fields" env ASSAY_RESULTS=results/results.json "$fields"
     check "$2: $3 points" grep -q "\"score\": $3" results/results.json
 }
 printf '#!/bin/sh\nexit 1\n' >"$tmp/broken"

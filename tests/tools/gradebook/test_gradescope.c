@@ -1,21 +1,13 @@
 /* results.json against the fields that Gradescope documents (gradescope-autograders.readthedocs.io, "Autograder specifications"):
  * names, types, values, and that there is a score or there are tests. The rules are written here from that page, not from
  * what we write. Each has a control: a file with that mistake is rejected. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <cmocka.h>
 
 #include "renderer/base/fs.h"
 #include "tools/gradebook/grade_batch.h"
+#include "tests/support/own.h"
+#include "tests/support/test.h"
 
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 static bool is_one_of(const char *text, const char *const *words)
 {
@@ -114,21 +106,6 @@ static bool valid_results(const json_t *root)
                                          json_array_size(json_object_get(root, "tests")) > 0);
 }
 
-static char dir[64];
-
-static int set_up(void **state)
-{
-    (void)state;
-    strcpy(dir, "/tmp/assay_gradescope_XXXXXX");
-    return mkdtemp(dir) == NULL;
-}
-
-static int tear_down(void **state)
-{
-    (void)state;
-    return system(fs_path("rm -rf %s", dir).s);
-}
-
 static json_t *a_check(const char *name, double points, double of, const char *visibility)
 {
     return json_pack("{ss, ss, ss, sf, sf, sf, sf, sb, ss, ss, ss, ss, ss, ss, ss, ss, sn, sn}",
@@ -177,25 +154,21 @@ static const char *output_of(const json_t *root, size_t i)
 static json_t *results_of(const char *id)
 {
     json_error_t why;
-    const struct path path = fs_path("%s/%s/results.json", dir, id);
-    json_t *root = json_load_file(path.s, 0, &why);
+    json_t *root = json_load_file(test_path(fs_path("%s/results.json", id).s), 0, &why);
     if (root == NULL)
-        fail_msg("%s: %s", path.s, why.text);
+        fail_msg("%s: %s", id, why.text);
     return root;
 }
 
-static void every_file_has_documented_fields_only(void **state)
+TEST(every_file_has_documented_fields_only)
 {
-    (void)state;
     static const char *const ids[] = {"ada", "bob", "cyd"};
     struct err e;
     json_auto_t *grades = a_class();
     assert_non_null(grades);
-    for (int i = 0; i < 3; i++) {
-        assert_int_equal(mkdir(fs_path("%s/%s", dir, ids[i]).s, 0700), 0);
-    }
-    if (!grade_write(dir, NULL, NULL, grades, &e))
-        fail_msg("%s", e.msg);
+    for (int i = 0; i < 3; i++)
+        assert_int_equal(mkdir(test_path(ids[i]), 0700), 0);
+    MUST(grade_write(test_path(""), NULL, NULL, grades, &e));
     for (int i = 0; i < 3; i++) {
         json_auto_t *root = results_of(ids[i]);
         assert_true(valid_results(root));
@@ -228,56 +201,45 @@ static void every_file_has_documented_fields_only(void **state)
     json_decref(root);
 }
 
-static void other_fields_and_values_are_rejected(void **state)
+TEST(other_fields_and_values_are_rejected)
 {
-    (void)state;
-    static const char *const wrong[] = {
-        "{}",
-        "[]",
-        "{\"tests\": []}",
-        "{\"score\": \"4\"}",
-        "{\"score\": 4, \"points\": 4}",
-        "{\"score\": 4, \"visibility\": \"shown\"}",
-        "{\"score\": 4, \"output_format\": \"markdown\"}",
-        "{\"score\": 4, \"tests\": {}}",
-        "{\"tests\": [{\"score\": true}]}",
-        "{\"tests\": [{\"score\": 1, \"max_score\": null}]}",
-        "{\"tests\": [{\"score\": 1, \"number\": 1.1}]}",
-        "{\"tests\": [{\"score\": 1, \"status\": \"ok\"}]}",
-        "{\"tests\": [{\"score\": 1, \"tags\": [1]}]}",
-        "{\"tests\": [{\"score\": 1, \"hint\": \"look\"}]}",
-        "{\"score\": 1, \"leaderboard\": [{\"name\": \"n\", \"value\": 1, \"order\": \"up\"}]}",
+    static const struct {
+        const char *text;
+        bool right;
+    } cases[] = {
+        {"{}", false},
+        {"[]", false},
+        {"{'tests': []}", false},
+        {"{'score': '4'}", false},
+        {"{'score': 4, 'points': 4}", false},
+        {"{'score': 4, 'visibility': 'shown'}", false},
+        {"{'score': 4, 'output_format': 'markdown'}", false},
+        {"{'score': 4, 'tests': {}}", false},
+        {"{'tests': [{'score': true}]}", false},
+        {"{'tests': [{'score': 1, 'max_score': null}]}", false},
+        {"{'tests': [{'score': 1, 'number': 1.1}]}", false},
+        {"{'tests': [{'score': 1, 'status': 'ok'}]}", false},
+        {"{'tests': [{'score': 1, 'tags': [1]}]}", false},
+        {"{'tests': [{'score': 1, 'hint': 'look'}]}", false},
+        {"{'score': 1, 'leaderboard': [{'name': 'n', 'value': 1, 'order': 'up'}]}", false},
+        {"{'score': 4}", true},
+        {"{'tests': [{'score': 1, 'max_score': 2, 'number': '1.1', 'tags': ['a'], "
+         "'status': 'passed', 'visibility': 'hidden'}], 'stdout_visibility': 'hidden'}",
+         true},
+        {"{'score': 1, 'leaderboard': [{'name': 'n', 'value': 1, 'order': 'asc'}]}", true},
     };
-    static const char *const right[] = {
-        "{\"score\": 4}",
-        ("{\"tests\": [{\"score\": 1, \"max_score\": 2, \"number\": \"1.1\", \"tags\": [\"a\"], "
-         "\"status\": \"passed\", \"visibility\": \"hidden\"}], \"stdout_visibility\": \"hidden\"}"),
-        "{\"score\": 1, \"leaderboard\": [{\"name\": \"n\", \"value\": 1, \"order\": \"asc\"}]}",
-    };
-    for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
-        json_auto_t *root = json_loads(wrong[i], 0, NULL);
-        assert_non_null(root);
-        if (valid_results(root))
-            fail_msg("not rejected: %s", wrong[i]);
-    }
-    for (size_t i = 0; i < sizeof right / sizeof *right; i++) {
-        json_auto_t *root = json_loads(right[i], 0, NULL);
-        if (!valid_results(root))
-            fail_msg("rejected: %s", right[i]);
+    for (size_t i = 0; i < COUNT(cases); i++) {
+        OWN_TEXT text = test_json(cases[i].text);
+        json_auto_t *root = json_loads(text, 0, NULL);
+        if (root == NULL || valid_results(root) != cases[i].right)
+            fail_msg("%s: %s", cases[i].right ? "rejected" : "not rejected", text);
     }
 }
 
-int main(int argc, char **argv)
+/* A file of another program, say of run_autograder. */
+TEST(a_file_that_is_given_has_documented_fields_only)
 {
-    /* A file of another program, say of run_autograder. */
-    if (argc == 2) {
-        json_auto_t *root = json_load_file(argv[1], 0, NULL);
-        bool valid = valid_results(root);
-        return valid ? 0 : 1;
-    }
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_file_has_documented_fields_only),
-        cmocka_unit_test(other_fields_and_values_are_rejected),
-    };
-    return cmocka_run_group_tests(tests, set_up, tear_down);
+    const char *path = getenv("ASSAY_RESULTS");
+    json_auto_t *root = path != NULL ? json_load_file(path, 0, NULL) : NULL;
+    assert_true(path == NULL || valid_results(root));
 }
