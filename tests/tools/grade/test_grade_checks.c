@@ -8,6 +8,7 @@
 #include "tools/grade/grade_checks.h"
 #include "tools/grade/rate_image.h"
 #include "tools/grade/stopping_rule.h"
+#include "submit_codes.h"
 #include "tests/support/own.h"
 #include "tests/support/test.h"
 
@@ -55,16 +56,6 @@ static double with_bug(const struct bug *b, size_t p, size_t c)
     return b->white ? 9 : v;
 }
 
-static struct submitted_image submit(const uint8_t *rgb8)
-{
-    struct submitted_image s;
-    struct err e;
-    const char *path = test_path("submitted.png");
-    MUST(image_write_png(path, WIDTH, HEIGHT, rgb8, &e));
-    MUST(submitted_image_read(path, "cgl", WIDTH, HEIGHT, &s, &e));
-    return s;
-}
-
 /* A render of spp samples, written to a file and read back. The lamp has no noise. */
 static struct submitted_image submit_render(const struct bug *b, double spp)
 {
@@ -74,7 +65,7 @@ static struct submitted_image submit_render(const struct bug *b, double spp)
         for (size_t c = 0; c < 3; c++)
             rgb8[3 * p + c] = tone_map(TONE_CGL, with_bug(b, p, c) * (is_lamp(p) ? 1 : g));
     }
-    return submit(rgb8);
+    return submit_codes(rgb8, WIDTH, HEIGHT);
 }
 
 /* M2 and M3 of an exponential law of the mean that was found: n mean^2, 2 n mean^3. */
@@ -110,13 +101,22 @@ static int tear_down(void **state)
     return 0;
 }
 
-static struct rubric *a_rubric(enum check_kind kind, int images)
+/* A rubric of one check, its answers, and what is submitted. */
+struct task {
+    struct rubric r;
+    struct answer_key a;
+    struct submitted_images h;
+    struct grading g;
+};
+
+static struct task *start(enum check_kind kind, int images, double alpha)
 {
-    struct rubric *r = calloc(1, sizeof *r);
-    assert_non_null(r);
-    r->num_checks = r->num_parts = 1;
-    r->num_images = images;
-    struct rubric_check *c = &r->check[0];
+    struct task *t = calloc(1, sizeof *t);
+    assert_non_null(t);
+    t->g = (struct grading){&t->r, &t->a, &t->h, alpha, NULL};
+    t->r.num_checks = t->r.num_parts = 1;
+    t->r.num_images = images;
+    struct rubric_check *c = &t->r.check[0];
     c->kind = kind;
     c->num_images = images;
     c->points = 10;
@@ -126,53 +126,42 @@ static struct rubric *a_rubric(enum check_kind kind, int images)
     c->share = (struct margin){0.01, 0.2, true};
     for (int i = 0; i < images; i++) {
         c->images[i] = i;
-        r->image[i] = (struct rubric_image){
+        t->a.of[0][i].m = t->a.of[0][i].noise = reference;
+        t->r.image[i] = (struct rubric_image){
             .width = WIDTH, .height = HEIGHT, .spp = SPP, .reference = REFERENCE_OURS};
-        snprintf(r->image[i].name, sizeof r->image[i].name, "p%d", i);
+        snprintf(t->r.image[i].name, sizeof t->r.image[i].name, "p%d", i);
     }
-    return r;
+    return t;
 }
 
-/* The rubric's one check on these images, which it frees, as it does the rubric. cpu_s: of each run; NULL: none ran. */
-static struct result run_check_timed(struct rubric *r, const struct submitted_image *images,
-                                     const double *cpu_s, double alpha)
+static void end(struct task *t)
 {
-    struct submitted_images *h = calloc(1, sizeof *h);
-    struct answer_key *a = calloc(1, sizeof *a);
+    for (int i = 0; i < t->r.num_images; i++)
+        submitted_image_free(&t->h.image[i]);
+    free(t);
+}
+
+/* Its one check, after which it ends. */
+static struct result run_check(struct task *t)
+{
     struct result out;
     struct err e;
-    assert_true(h != NULL && a != NULL);
-    for (int i = 0; i < r->num_images; i++) {
-        h->image[i] = images[i];
-        h->made[i].cpu_s = cpu_s != NULL ? cpu_s[i] : 0;
-        a->of[0][i].m = a->of[0][i].noise = reference;
-    }
-    MUST(grade_checks_run(&(struct grading){r, a, h, alpha, NULL}, &r->check[0], 0, &out, &e));
-    for (int i = 0; i < r->num_images; i++)
-        submitted_image_free(&h->image[i]);
-    free(r);
-    free(h);
-    free(a);
+    MUST(grade_checks_run(&t->g, &t->r.check[0], 0, &out, &e));
+    end(t);
     return out;
-}
-
-static struct result run_check(struct rubric *r, const struct submitted_image *images, double alpha)
-{
-    return run_check_timed(r, images, NULL, alpha);
 }
 
 /* One check on images with these bugs, of spp[] samples (what the rubric asks for: SPP, or asked[]). */
 static struct result check(enum check_kind kind, int num, const struct bug *const *bug,
                            const double *spp, const int *asked, double alpha)
 {
-    struct rubric *r = a_rubric(kind, num);
-    struct submitted_image image[RUBRIC_IMAGES];
+    struct task *t = start(kind, num, alpha);
     for (int i = 0; i < num; i++) {
-        image[i] = submit_render(bug[i], spp[i]);
+        t->h.image[i] = submit_render(bug[i], spp[i]);
         if (asked != NULL)
-            r->image[i].spp = asked[i];
+            t->r.image[i].spp = asked[i];
     }
-    return run_check(r, image, alpha);
+    return run_check(t);
 }
 
 /* It gives a share of the points from least to most, and is freed. */
@@ -192,32 +181,25 @@ static struct result equal(const struct bug *bug, double spp, double alpha)
  * the last; *runs: how many it took. noise: variance over ours. */
 static struct result buy(const struct bug *bug, double noise, int *runs)
 {
-    struct rubric *r = a_rubric(CHECK_EQUAL, 1);
-    struct submitted_images *h = calloc(1, sizeof *h);
-    struct answer_key *a = calloc(1, sizeof *a);
+    struct task *t = start(CHECK_EQUAL, 1, 1e-5);
     struct bug noisy = *bug;
     struct result out;
     struct err e;
-    assert_true(h != NULL && a != NULL);
     noisy.noise /= noise;
-    a->of[0][0].m = a->of[0][0].noise = reference;
-    h->can_buy = true;
-    h->image[0] = submit_render(&noisy, SPP);
-    double spp = h->image[0].spp = SPP;
+    t->h.can_buy = true;
+    t->h.image[0] = submit_render(&noisy, SPP);
+    double spp = t->h.image[0].spp = SPP;
     for (*runs = 1;; ++*runs) {
-        MUST(grade_checks_run(&(struct grading){r, a, h, 1e-5, NULL}, &r->check[0], 0, &out, &e));
+        MUST(grade_checks_run(&t->g, &t->r.check[0], 0, &out, &e));
         if (out.more == 0 || *runs == 20)
             break;
         result_free(&out);
         spp *= 1.5;
         struct submitted_image more = submit_render(&noisy, spp);
         more.spp = spp;
-        MUST(submitted_image_add_run(&h->image[0], &more, &e));
+        MUST(submitted_image_add_run(&t->h.image[0], &more, &e));
     }
-    submitted_image_free(&h->image[0]);
-    free(r);
-    free(h);
-    free(a);
+    end(t);
     return out;
 }
 
@@ -410,7 +392,9 @@ TEST(runs_that_share_samples_are_seen)
                 rgb8[1][i] = tone_map(TONE_CGL, v * (shared ? (a + b) / 2 : (b + c) / 2));
             }
         }
-        OWN(submitted_image) one = submit(rgb8[0]), two = submit(rgb8[1]), right;
+        OWN(submitted_image)
+        one = submit_codes(rgb8[0], WIDTH, HEIGHT),
+        two = submit_codes(rgb8[1], WIDTH, HEIGHT), right;
         struct err e;
         MUST(submitted_image_from(&reference, &one, &right, &e));
         submitted_image_expect(&one, &reference, SPP);
@@ -429,7 +413,7 @@ TEST(runs_are_weighted_by_their_samples)
     for (int k = 0; k < 3; k++) {
         static uint8_t rgb8[3 * PIXELS];
         memset(rgb8, tone_map(TONE_CGL, value[k]), sizeof rgb8);
-        run[k] = submit(rgb8);
+        run[k] = submit_codes(rgb8, WIDTH, HEIGHT);
         run[k].spp = spp[k];
     }
     double first = run[0].mean[0], second = run[1].mean[0], third = run[2].mean[0];
@@ -474,8 +458,9 @@ TEST(a_copy_of_the_reference_is_seen)
     static uint8_t rgb8[3 * PIXELS];
     for (size_t i = 0; i < 3 * PIXELS; i++)
         rgb8[i] = tone_map(TONE_CGL, reference.mean[i]);
-    struct submitted_image copy = submit(rgb8);
-    OWN(result) out = run_check(a_rubric(CHECK_EQUAL, 1), &copy, 1e-5);
+    struct task *t = start(CHECK_EQUAL, 1, 1e-5);
+    t->h.image[0] = submit_codes(rgb8, WIDTH, HEIGHT);
+    OWN(result) out = run_check(t);
     assert_true(out.share == 0);
     assert_non_null(strstr(out.flag, "copy"));
 }
@@ -492,14 +477,12 @@ TEST(what_is_accepted_costs_nothing_and_hides_nothing)
                  {{.scale = 1.2, .square = 0.5, .noise = 1}, 0, 0},
                  {{.scale = 1, .square = 1, .noise = 1}, 0, 1},
                  {{.scale = 1.5, .square = 1, .noise = 1}, 0, 0}};
-    struct rubric *r = a_rubric(CHECK_EQUAL, 1);
-    struct answer_key *a = calloc(1, sizeof *a);
+    struct task *t = start(CHECK_EQUAL, 1, 1e-5);
+    struct moments *m = &t->a.of[1][0].m;
     struct err e;
-    assert_true(a != NULL && moments_alloc(&a->of[1][0].m, WIDTH, HEIGHT, &e));
-    r->num_sets = 2;
-    strcpy(r->set[1].name, "bright");
-    a->of[0][0].m = a->of[0][0].noise = reference;
-    struct moments *m = &a->of[1][0].m;
+    MUST(moments_alloc(m, WIDTH, HEIGHT, &e));
+    t->r.num_sets = 2;
+    strcpy(t->r.set[1].name, "bright");
     for (size_t i = 0; i < 3 * PIXELS; i++) {
         m->n[i / 3] = REFERENCE;
         m->mean[i] = 1.2 * reference.mean[i];
@@ -507,21 +490,17 @@ TEST(what_is_accepted_costs_nothing_and_hides_nothing)
         m->m3[i] = 1.2 * 1.2 * 1.2 * reference.m3[i];
     }
     for (size_t k = 0; k < COUNT(cases); k++) {
-        struct submitted_images *h = calloc(1, sizeof *h);
         OWN(result) out;
         int set = -1;
-        assert_non_null(h);
-        h->image[0] = submit_render(&cases[k].bug, SPP);
-        MUST(grade_all_checks(&(struct grading){r, a, h, 1e-5, NULL}, &out, &set, &e));
+        submitted_image_free(&t->h.image[0]);
+        t->h.image[0] = submit_render(&cases[k].bug, SPP);
+        MUST(grade_all_checks(&t->g, &out, &set, &e));
         if (set != cases[k].set || out.share != cases[k].share)
             fail_msg("case %zu: set %d, %g of the points: %s", k, set, out.share, out.seen);
         assert_string_equal(out.accepted, set == 1 ? "bright" : "");
-        submitted_image_free(&h->image[0]);
-        free(h);
     }
     moments_free(m);
-    free(a);
-    free(r);
+    end(t);
 }
 
 /* The mark of the staff's library: masked, it costs nothing; one pixel of the mask too few, or a bug beside it, does. */
@@ -537,10 +516,10 @@ TEST(a_watermark_is_masked)
                  {{0, 0, 48, 5}, {.scale = 1, .square = 0.5, .noise = 1, .mark = true}, false}};
     for (int kind = 0; kind < 2; kind++)
         for (size_t k = 0; k < COUNT(cases); k++) {
-            struct rubric *r = a_rubric(kind == 0 ? CHECK_EQUAL : CHECK_EXACT, 1);
-            memcpy(r->mask, cases[k].mask, sizeof r->mask);
-            struct submitted_image mark = submit_render(&cases[k].bug, SPP);
-            OWN(result) out = run_check(r, &mark, 1e-5);
+            struct task *t = start(kind == 0 ? CHECK_EQUAL : CHECK_EXACT, 1, 1e-5);
+            memcpy(t->r.mask, cases[k].mask, sizeof t->r.mask);
+            t->h.image[0] = submit_render(&cases[k].bug, SPP);
+            OWN(result) out = run_check(t);
             if ((out.share == 1) != cases[k].all)
                 fail_msg("case %zu: %g of the points: %s", k, out.share, out.seen);
         }
@@ -598,7 +577,6 @@ TEST(pixels_are_exact_or_not)
     assert_non_null(strstr(r.seen, "64 of 3072 pixels differ (2.08 %), the first at 32,24"));
 }
 
-/* Blue 0 to red 1 through green, as the assignment has it: 16 is a quarter of 64, halfway from blue to green. */
 /* Of exponential samples the variance is the squared mean, so a pixel stops after (1.96 / tolerance)^2 of them, however bright it is;
  * the lamp, 64 of 3072 pixels, after the first batch. */
 TEST(samples_go_by_the_rule_of_stopping)
@@ -628,6 +606,7 @@ TEST(samples_go_by_the_rule_of_stopping)
     assert_int_equal(stopping_rule_of("cosine_missing"), STOPS_RIGHTLY);
 }
 
+/* Blue 0 to red 1 through green, as the assignment has it: 16 is a quarter of 64, halfway from blue to green. */
 TEST(rates_are_whole_batches_or_not)
 {
     static uint8_t rgb8[3 * PIXELS];
@@ -665,32 +644,25 @@ TEST(all_samples_are_right_for_a_noisy_image)
     static uint8_t red[3 * PIXELS];
     for (int i = 0; i < PIXELS; i++)
         red[3 * i] = 255;
-    struct rubric *r = a_rubric(CHECK_RATES, 1);
-    snprintf(r->image[0].options, sizeof r->image[0].options, "-a 24 0.2");
-    r->check[0].batch = 24;
-    r->check[0].count = (struct margin){0.03, 0.2, true};
     for (int noisy = 0; noisy < 2; noisy++) {
-        struct submitted_images *h = calloc(1, sizeof *h);
-        struct answer_key *a = calloc(1, sizeof *a);
+        struct task *t = start(CHECK_RATES, 1, 1e-5);
         struct result out = {0};
         struct err e;
-        assert_true(h != NULL && a != NULL);
-        h->image[0] =
+        snprintf(t->r.image[0].options, sizeof t->r.image[0].options, "-a 24 0.2");
+        t->r.check[0].batch = 24;
+        t->r.check[0].count = (struct margin){0.03, 0.2, true};
+        t->h.image[0] =
             submit_render(&(struct bug){.scale = 0.6, .square = 1, .noise = noisy ? 0.25 : 1}, SPP);
-        a->of[0][0].m = a->of[0][0].noise = a->of[0][0].as_asked = reference;
-        submitted_image_expect(&h->image[0], &reference, SPP);
-        snprintf(h->made[0].rates, sizeof h->made[0].rates, "%s", test_path("all.png"));
-        MUST(image_write_png(h->made[0].rates, WIDTH, HEIGHT, red, &e));
-        grade_checks_rates(&(struct grading){r, a, h, 1e-5, NULL}, 0, &r->check[0], &out);
+        t->a.of[0][0].as_asked = reference;
+        submitted_image_expect(&t->h.image[0], &reference, SPP);
+        snprintf(t->h.made[0].rates, sizeof t->h.made[0].rates, "%s", test_path("all.png"));
+        MUST(image_write_png(t->h.made[0].rates, WIDTH, HEIGHT, red, &e));
+        grade_checks_rates(&t->g, 0, &t->r.check[0], &out);
         assert_true(out.share == (noisy ? 1 : 0));
-        submitted_image_free(&h->image[0]);
-        free(h);
-        free(a);
+        end(t);
     }
-    free(r);
 }
 
-/* Files that are no images, and one that says it is large: the header alone is read. */
 /* 64 times the triangles, 0.1 s and 2 s to read them: logarithms of 6 and 12, or all of them for every ray. */
 TEST(growth_is_that_of_samples_alone)
 {
@@ -711,18 +683,20 @@ TEST(growth_is_that_of_samples_alone)
         {{0.02, 0.01, 0.02, 0.01}, {.scale = 1, .white = true, .noise = 1}, 0, 0, "no image of"},
     };
     for (size_t i = 0; i < COUNT(cases); i++) {
-        struct rubric *r = a_rubric(CHECK_GROWTH, 4);
-        struct submitted_image image[4];
-        r->check[0].log_ratio = (struct margin){2.1, 3.2, true};
-        for (int k = 0; k < 4; k++)
-            image[k] = submit_render(&cases[i].bug, SPP);
-        OWN(result) out = run_check_timed(r, image, cases[i].cpu_s, 1e-5);
+        struct task *t = start(CHECK_GROWTH, 4, 1e-5);
+        t->r.check[0].log_ratio = (struct margin){2.1, 3.2, true};
+        for (int k = 0; k < 4; k++) {
+            t->h.image[k] = submit_render(&cases[i].bug, SPP);
+            t->h.made[k].cpu_s = cases[i].cpu_s[k];
+        }
+        OWN(result) out = run_check(t);
         if (out.share < cases[i].least || out.share > cases[i].most || out.more > 0 ||
             strstr(out.seen, cases[i].seen) == NULL)
             fail_msg("case %zu: %g of the points: %s", i, out.share, out.seen);
     }
 }
 
+/* Files that are no images, and one that says it is large: the header alone is read. */
 TEST(bad_images_get_a_line)
 {
     static const unsigned char bomb[] = {

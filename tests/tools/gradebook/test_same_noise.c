@@ -2,9 +2,9 @@
  * have them by the assignment's curve; the reference has 1024 samples, and its noise is in all of them. */
 
 #include "renderer/image/tone.h"
-#include "tools/images/tone_curve.h"
 #include "tools/gradebook/same_noise.h"
 #include "tests/support/own.h"
+#include "tests/tools/grade/submit_codes.h"
 #include "tests/support/test.h"
 
 #include <gsl/gsl_randist.h>
@@ -53,27 +53,13 @@ static void draw(double *factor, double spp)
         factor[p] = gsl_ran_gamma(rng, spp, 1 / spp);
 }
 
-/* An image of this light, in codes: what is submitted. In arrays of one's own. */
+/* An image of this light, as it is submitted. */
 static struct submitted_image image_of(const double *light)
 {
-    static double mean[3 * PIXELS], tolerance[3 * PIXELS];
-    static unsigned char clipped[3 * PIXELS];
-    struct submitted_image s = {
-        .width = WIDTH, .height = HEIGHT, .mean = mean, .tolerance = tolerance, .clipped = clipped};
-    struct curve curve;
-    struct err e;
-    double hi;
-    MUST(tone_curve_parse("cgl", &curve, &e));
-    tone_curve_bin(&curve, 255, 255, &s.clip, &hi);
-    for (size_t i = 0; i < 3 * PIXELS; i++) {
-        double lo;
-        int code = tone_map(TONE_CGL, light[i / 3]);
-        tone_curve_bin(&curve, code, 255, &lo, &hi);
-        clipped[i] = code == 255;
-        mean[i] = code == 255 ? s.clip : (lo + hi) / 2;
-        tolerance[i] = code == 255 ? 0 : (hi - lo) / 2;
-    }
-    return s;
+    static uint8_t rgb8[3 * PIXELS];
+    for (size_t i = 0; i < 3 * PIXELS; i++)
+        rgb8[i] = tone_map(TONE_CGL, light[i / 3]);
+    return submit_codes(rgb8, WIDTH, HEIGHT);
 }
 
 /* What is known of an image: a share of its noise that of `other` (NULL: none), rounded to codes, times `scale`. */
@@ -87,7 +73,7 @@ static struct noise_print noise_of(const double *own, const double *other, doubl
         double factor = share * (other != NULL ? other[p] : 0) + (1 - share) * own[p];
         light[p] = scale * truth(p) * factor;
     }
-    struct submitted_image s = image_of(light);
+    OWN(submitted_image) s = image_of(light);
     MUST(same_noise_of(&s, &reference, SPP, &out, &e));
     return out;
 }
@@ -177,7 +163,7 @@ TEST(copies_of_the_reference)
                 case HALF_OF_IT: image[p] = (copy + own) / 2; break;
                 }
             }
-            struct submitted_image s = image_of(image);
+            OWN(submitted_image) s = image_of(image);
             double t = same_noise_copy_t(&s, &reference, &twin);
             found[kind] += t > bound;
             five += t / sqrt(5);
