@@ -24,7 +24,8 @@ static int find_short(const struct cli_option *options, char name)
     return CLI_ERROR;
 }
 
-/* Letters to change, insert, leave out or exchange with the next [Damerau64], of words within 31 letters. */
+/* Damerau-Levenshtein distance of two words of at most 31 letters [Damerau64]: letters to change,
+ * insert, delete or exchange with their neighbour. MOST for longer words. */
 static int distance(const char *a, size_t n, const char *b)
 {
     enum { MOST = 32 };
@@ -138,7 +139,8 @@ static int next_long(struct cli *c, const char *arg, struct err *e)
     return i;
 }
 
-/* `at`: the letter in arg that is next; others may stand behind it, or its argument. */
+/* at: the letter in arg to be read next. Behind it may stand more flags (-qv) or the option's
+ * argument (-j4). */
 static int next_short(struct cli *c, const char *arg, const char *at, struct err *e)
 {
     int i = find_short(c->options, *at);

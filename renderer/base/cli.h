@@ -42,7 +42,9 @@ struct cli_option {
     double lo,
         hi; /* of a number; lo: what an int becomes without arguments, or by the first of the names */
     const char *const *names;    /* a text is one of these, an int lo + its index; NULL: any */
-    const struct cli_unit *unit; /* a double is cli_with_unit(), at most hi; NULL: no units */
+    const struct cli_unit *unit; /* of a double: the suffixes it may have (cli_time_units: s, m, h).
+                                  * The number before the suffix is then at least 1e-9 and at most
+                                  * hi; lo is not used. NULL: no suffix */
     size_t num;                  /* CLI_LIST: where the int is that counts */
     const char *noun;            /* what a CLI_LIST or CLI_RANGE is of, for messages */
     bool (*read)(void *settings, const char *const value[4], struct err *e); /* CLI_READ: does it */

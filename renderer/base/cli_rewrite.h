@@ -9,7 +9,8 @@ struct option_words {
     int args;
 };
 
-/* What says how far, where to, where or how a render of pathtracer goes on, not what it is of. Ends with a NULL name. */
+/* Options of pathtracer that do not say what is rendered: which samples, where output goes,
+ * threads, time and error limits, checkpoints, resuming, Slurm, messages. Ends with a NULL name. */
 extern const struct option_words cli_rewrite_render[];
 
 /* Is an option among the words, as -t, --threads or --threads=N? */

@@ -8,8 +8,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Bytes: what is larger is not in the cache when a ray comes to it. Tests: of boxes that overlap as much every ray
- * meets the same ones, and these are. */
+/* Rays are traversed in turns, one step of each (single_in_turns()), if the tree has more than
+ * IN_TURNS_FROM bytes, as its nodes are then rarely in the cache, and if a random ray costs fewer
+ * than IN_TURNS_TESTS tests. More tests mean boxes that overlap heavily: then all rays visit the
+ * same nodes, and those are in the cache. */
 enum { IN_TURNS_FROM = 16 << 20, IN_TURNS_TESTS = 64 };
 
 /* A leaf that has its place and is not filled yet. */

@@ -64,7 +64,9 @@ static mat4 change_axes(int from, int to, double size)
     return m;
 }
 
-/* The frame of an element that one of the frame `outside` names, but for what itself and its library say. */
+/* The coordinate frame (unit and up axis) of the document that holds `element`, which is referenced
+ * from frame `outside`: the same frame in the same document, else that of the other document's
+ * <asset>. enter() adds the <asset>s of the element and of its library. */
 static struct frame home_of(struct loader *ld, const xmlNode *element, const struct frame *outside)
 {
     struct frame home = {.doc = element->doc, .unit = 1};

@@ -1,5 +1,6 @@
-/* The material tags of our own extras and of the assignment's: an <effect>'s technique with
- * profile="ASSAY" or profile="CGL". */
+/* The material tags of our own extras and of the assignment's: the children of an <effect>'s technique with
+ * profile="ASSAY" or profile="CGL". A tag that extra_read_material() does not list is an error ("unexpected <x> in
+ * <technique>", from element_check()). */
 #include "collada_internal.h"
 
 #include <string.h>

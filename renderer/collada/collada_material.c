@@ -1,4 +1,5 @@
-/* Materials: from the symbol of a primitive over <instance_material> and <material> to <effect>. */
+/* Materials: resolves the material symbol of a primitive through <instance_material> and <material> to an <effect>, and
+ * reads its profile_COMMON. The material tags of our own extras are read in collada_extra.c. */
 #include "collada_internal.h"
 
 #include <string.h>

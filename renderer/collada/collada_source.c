@@ -77,9 +77,10 @@ static size_t get_source(struct loader *ld, struct sources *all, const xmlNode *
     return all->count - 1;
 }
 
-/* An <input> of a primitive, or of its <vertices>: then *of_vertex is where their index stands. What hangs on texture
- * coordinates shows nothing of its own, and unknown semantics mean something to some other program. Vertex colours do not
- * show in the assignment; elsewhere they would be expected to. */
+/* Reads an <input> of a primitive, or of its <vertices> (then *of_vertex is the offset of the
+ * vertex index). Inputs that matter only with texture coordinates, such as tangents, and unknown
+ * semantics are skipped. Vertex colours are ignored in the CGL dialect and an error in COLLADA,
+ * where a user would expect to see them. */
 static void read_input(struct loader *ld, struct sources *all, const xmlNode *input,
                        const uint64_t *of_vertex, struct inputs *in)
 {

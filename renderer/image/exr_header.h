@@ -1,5 +1,5 @@
-/* The outline of an OpenEXR header, read before OpenEXR reads it: that library reserves what an attribute says it
- * is long, up to 2 GiB, before it looks whether the file is. */
+/* Checks the structure of an OpenEXR header before the library reads it: the library allocates as many bytes as an
+ * attribute claims to have, up to 2 GiB, before it checks that the file is that long. */
 #ifndef ASSAY_EXR_HEADER_H
 #define ASSAY_EXR_HEADER_H
 

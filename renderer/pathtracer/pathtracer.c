@@ -198,7 +198,8 @@ static bool write_heatmap(const struct output *out, const struct bvh *bvh, const
     return true;
 }
 
-/* One image of what is loaded. is_last: a signal that comes too late for it is of no use to another. */
+/* Renders one image of the loaded scene. is_last: no other image follows, so a signal that arrives
+ * after the last sample is dropped. */
 static bool render_seed(struct session *s, const struct camera *camera, const struct bvh *bvh,
                         bool is_last, struct err *e)
 {

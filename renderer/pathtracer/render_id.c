@@ -6,7 +6,8 @@
 #include <stdio.h>
 #include <string.h>
 
-/* What settings say only where it is not as ever, so that renders of before have the same text. */
+/* Adds a setting that newer versions have. It is written only if it differs from the default, so
+ * that images made before it existed have the same text. */
 __attribute__((format(printf, 2, 3))) static void add_setting(struct render_id *id,
                                                               const char *format, ...)
 {

@@ -101,9 +101,10 @@ struct region {
     dvec3 middle;
 };
 
-/* The part of cells' luminance that falls on a surface whose normal is anywhere within an angle of one from which light
- * comes at the cosine x. Positive wherever a part can be, the mean of positive cosines over x - s .. x + s where the
- * surface's edge may be in sight. */
+/* The cosine factor for light from a region, for a surface whose normal is known only to within
+ * `angle`. x: cosine between the rounded normal and the middle of the region. Where part of the
+ * region may be below the horizon it is the mean of max(0, c) over c in [x - sin(angle), x +
+ * sin(angle)]; from 90 degrees on a linear ramp. Positive wherever light may arrive. */
 static double part_received(double x, double angle)
 {
     const double s = sin(angle);

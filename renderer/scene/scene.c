@@ -62,7 +62,8 @@ static bool material_numbers_are_valid(const struct material *m)
            is_radiometric(m->eta) && is_radiometric(m->k);
 }
 
-/* What a colour is at most where a map multiplies it; negative or NaN if it is so somewhere. */
+/* The largest value that a colour takes where a texture multiplies it. If any texel is negative or not
+ * a number, the product with the least one is returned, so that the caller's check fails. */
 static rgb largest(const struct scene *s, rgb factor, uint32_t map)
 {
     if (map == 0)

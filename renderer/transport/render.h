@@ -1,5 +1,5 @@
-/* An image: passes over all of it, each a few samples for every pixel, tile by tile from a queue by
- * threads, into a film. */
+/* Renders an image into a film: passes over the whole image, each a few samples per pixel; threads take tiles from a
+ * queue. */
 #ifndef ASSAY_RENDER_H
 #define ASSAY_RENDER_H
 
