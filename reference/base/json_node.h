@@ -1,4 +1,5 @@
-/* Reading a JSON object strictly: every error names the file and the member. And members of what was checked before. */
+/* Strict reading of JSON objects: every error names the file and the key. Also accessors for
+ * documents that were checked before. */
 #ifndef ASSAY_JSON_NODE_H
 #define ASSAY_JSON_NODE_H
 

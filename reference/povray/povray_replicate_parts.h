@@ -1,4 +1,4 @@
-/* The images that POV-Ray is asked for: what a replicate is made of.
+/* How a replicate of a POV-Ray reference is composed of POV-Ray images.
  *
  *     total_i = fine + (indirect_i - direct_i)
  *

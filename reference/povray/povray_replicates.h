@@ -1,5 +1,6 @@
-/* All images of one reference by POV-Ray. Image t of replicate_images.h is window t for t < POVRAY_WINDOWS, and for the rest what a
- * replicate adds: all passes of a window, or those of a replicate's pair (povray_replicate_parts.h), added. */
+/* The images of one POV-Ray reference, POV-Ray's command line for each, and how they are folded into moments.
+ * Image t (replicate_images.h) is window t for t < POVRAY_WINDOWS. Each later image is what one replicate adds: the
+ * difference of its pair (povray_replicate_parts.h), summed over all passes. */
 #ifndef ASSAY_POVRAY_REPLICATES_H
 #define ASSAY_POVRAY_REPLICATES_H
 

@@ -1,4 +1,4 @@
-/* Closed forms of direct light on a Lambertian plane: nothing is in the way of a lamp.
+/* Closed forms of direct light on a Lambertian plane, without occluders.
  *
  * kind                   "values" in the .json (all keys needed, no others; triples are R, G, B)
  * point_over_plane       intensity [W sr^-1], albedo, light [x, height, z], footprint
@@ -13,8 +13,8 @@
  * The plane is y = 0. footprint {x: [left, right], z: [top, bottom]} is the part of it that the
  * whole image covers: column 0 begins at x = left, row 0 (the top row) at z = top. The box-filtered
  * value of a pixel is the Gauss-Legendre quadrature (GSL) of the closed form over it. */
-#ifndef ASSAY_TRUTH_ONE_LAMP_H
-#define ASSAY_TRUTH_ONE_LAMP_H
+#ifndef ASSAY_TRUTH_LAMPS_H
+#define ASSAY_TRUTH_LAMPS_H
 
 #include "truth.h"
 

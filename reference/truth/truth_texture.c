@@ -45,7 +45,8 @@ static int texel_at(int k, int n, enum wrap wrap)
     return m < n ? m : period - 1 - m;
 }
 
-/* Shares of n texels in the mean over coordinates a .. b (in images) of an axis, which is a part of one pixel. */
+/* Weights of the n texels in the mean of the texture over the coordinates a .. b of one axis (in
+ * images), times `part`, the fraction of the pixel that this interval covers. */
 static void axis_shares(double a, double b, int n, enum wrap wrap, bool nearest, double part,
                         double *share)
 {
@@ -59,7 +60,8 @@ static void axis_shares(double a, double b, int n, enum wrap wrap, bool nearest,
     }
 }
 
-/* The part of pixel p of `size` that lies within from .. to, shares of the image, and the coordinates there. False: none does. */
+/* The part of pixel p (of `size`) that lies in [from, to], fractions of the image, and the texture
+ * coordinates of its ends. False if the pixel is outside. */
 static bool overlap(int p, int size, double from, double to, double at_from, double at_to,
                     double range[2], double *part)
 {
