@@ -1,5 +1,5 @@
-/* Second routes for the tests of scattering, in double precision and without the renderer: Fresnel's
- * equations in complex numbers, microfacet conductors, integrals over directions. */
+/* Independent formulas for the BSDF tests, in double precision and without the renderer's code: Fresnel's equations in
+ * complex numbers, microfacet conductors (GGX, Beckmann), integrals over directions. */
 #ifndef ASSAY_TEST_OPTICS_H
 #define ASSAY_TEST_OPTICS_H
 

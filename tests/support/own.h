@@ -1,4 +1,5 @@
-/* Local variables that are freed where their block ends; not where the test fails. */
+/* Scope-based cleanup for tests: variables that are freed at the end of their block, but not if the
+ * test fails there. */
 #ifndef ASSAY_TESTS_OWN_H
 #define ASSAY_TESTS_OWN_H
 

@@ -60,7 +60,8 @@ TEST(independent_replicates_pass)
             struct replicates r = draw_all(rows[i].law, rows[i].count, rows[i].blur, &seed);
             struct independence t = test(&r, 0.01);
             assert_true(t.tested);
-            /* Blurred pixels are correlated and are refused for that: here it is the other tests. */
+            /* Blurred pixels are correlated, so the test of pixels refuses them, as it should. Here
+             * only the other three tests are counted. */
             failed += rows[i].blur
                           ? fabs(t.pair_z) > t.pair_limit || fabs(t.neighbours_z) > t.limit ||
                                 fabs(t.batches_z) > t.limit
@@ -185,7 +186,8 @@ TEST(correlated_pixels_are_measured)
     replicates_free(&r);
 }
 
-/* Adds one normal number to all pixels of each replicate, with `variance` of a pixel's own. */
+/* Adds one normal number per replicate to all of its pixels, scaled to `variance` times each pixel's
+ * own variance. */
 static void share(struct replicates *r, double variance, uint64_t *state)
 {
     for (int k = 0; k < r->num; k++) {
@@ -242,10 +244,12 @@ static struct replicates splat_all(int count, double sharing, uint64_t *state)
     return r;
 }
 
-/* H0, with the filter known: a large square varies 2.25 times as much as its pixels do (test_camera.c), not 1.5 times more than that, and replicates are
- * independent. alpha 1 %, n = 200 sets of 16: at most 10 fail but for 7e-5. Control: the same images with the filter
- * unknown are all refused. The ratio itself, over squares of 16: 2.25 less what the border cuts, (1 - 1/48)^2 of it, to 10 %: K 16
- * times 4 squares times 200 sets have a standard error of 1.4 %. */
+/* H0 with a known filter: the sum over a large square varies 2.25 times as much as its pixels do
+ * (test_camera.c), and replicates are independent; the limit allows 1.5 times more than that. alpha
+ * 1 %, n = 200 sets of 16: more than 10 failures have probability 7e-5. Control: with the filter
+ * unknown all sets are refused. The measured ratio over squares of 16 must be 2.25 (1 - 1/48)^2 (the
+ * border cuts the rest) within 10 %: its standard error, from 16 replicates of 4 squares in 200
+ * sets, is 1.4 %. */
 TEST(a_known_filter_is_allowed_for)
 {
     uint64_t seed = 20261123;

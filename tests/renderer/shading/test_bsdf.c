@@ -1,5 +1,6 @@
-/* Scattering at a surface against itself (samples, density, value) and against double precision
- * routes of tests/support/optics.h. One seed, fixed n, no retry.
+/* BSDF tests: samples, density and value must agree with each other, and with the textbook formulas
+ * (GGX, Beckmann, Fresnel) in double precision of tests/support/optics.h. One seed, fixed n, no
+ * retry.
  *
  * The statistical tests run over the table {diffuse; GGX, Beckmann x alpha .02 .1 .3 .7 1; three plastics} x
  * {wo at 0, 30, 60, 80, 87 degrees}. H0: directions have the density bsdf_pdf_w() (chi-square over 80

@@ -1,5 +1,5 @@
-/* The stages on eight paths at a time: each sample has the bits that they give it one at a time, with
- * every set of instructions that this machine has. */
+/* The integrator's stages give every sample the same bits at every vector width: one lane (ISA_SCALAR) against eight
+ * (SSE4.2, AVX2) and sixteen (AVX-512), for each instruction set that this machine has. */
 #include "renderer/scene/cs184_deviations.h"
 #include "renderer/math/trig.h"
 #include "tests/support/render_check.h"

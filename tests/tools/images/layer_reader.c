@@ -9,6 +9,8 @@
 
 #include <cmocka.h>
 
+/* Letters as in tools/images/pixel_codec.h. */
+
 /* Undoes zz() of the pixel's bytes, which are a plane apart. */
 static long unzigzag(const uint8_t *low, size_t pixels, size_t i, int bytes)
 {
