@@ -1,5 +1,6 @@
-/* What a process may do from now on, it and all that it starts, told to the kernel without namespaces: whose process it is, which system
- * calls it has (seccomp), which files (Landlock). The last two need no privileges, and not every kernel has them. */
+/* Restrictions on a process and its children that need no namespaces: its user, its system calls
+ * (seccomp) and its files (Landlock). seccomp and Landlock need no privileges, but not every kernel
+ * has them. */
 #ifndef ASSAY_CONFINE_H
 #define ASSAY_CONFINE_H
 
@@ -18,13 +19,16 @@ struct confine {
 
 enum { CONFINE_FILTER = 512 /* bytes of a filter, at most */ };
 
-/* A program for seccomp(2) that refuses what no limit counts: memory without a file (memfd_create, memfd_secret, System V), and all calls
- * by another architecture's numbers. alone: there are no namespaces around it, so also the network, message queues, tracing and namespaces of its
- * own. Returns its bytes; 0: this machine has none. */
+/* Makes a filter for seccomp(2). It refuses memory that no limit counts (memfd_create, memfd_secret,
+ * System V) and all calls by another architecture's numbers. alone: there are no namespaces around
+ * the process, so the network, message queues, tracing and new namespaces are refused, too. Returns
+ * the filter's length in bytes; 0: none can be made for this machine. */
 size_t confine_filter(bool alone, unsigned char filter[CONFINE_FILTER]);
 
-/* A Landlock ruleset: may read and run `read`, and do as it likes in `write` (NULL at the end); never what is in `hidden`, real paths,
- * even where a directory of `read` holds them. Paths that are not there are left out. *ruleset is -1 where the kernel has no Landlock. */
+/* Makes a Landlock ruleset: the process may read and run what is in `read`, and do anything in
+ * `write`. Paths of `hidden` stay closed even below a directory of `read`; they are real paths. All
+ * three end with NULL; paths that do not exist are left out. *ruleset is -1 where the kernel has no
+ * Landlock. */
 NODISCARD bool confine_files(const char *const *read, const char *const *write,
                              const char *const *hidden, int *ruleset, struct err *e);
 

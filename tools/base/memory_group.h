@@ -1,6 +1,8 @@
-/* Memory of a run and all that it starts, bounded by the kernel: a control group of its own, which counts what no process has any more, too
- * [Linux, Documentation/admin-guide/cgroup-v2.rst; cgroup-v1/memory.rst]. Where none can be made there is none: that takes root,
- * or a hierarchy (of version 1) whose part that this process is in was given to its user. */
+/* A memory limit that the kernel enforces on a run and all processes that it starts: a control
+ * group of its own. It also counts memory that belongs to no process any more [Linux,
+ * Documentation/admin-guide/cgroup-v2.rst; cgroup-v1/memory.rst]. Making one takes root or, with
+ * version 1, a hierarchy whose part that holds this process was given to its user; otherwise there
+ * is no such limit. */
 #ifndef ASSAY_MEMORY_GROUP_H
 #define ASSAY_MEMORY_GROUP_H
 

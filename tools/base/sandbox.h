@@ -1,21 +1,31 @@
-/* Runs programs that nobody vouches for. Each run gets an empty machine of its own, made with bubblewrap
- * (bwrap) in two shells: the program sees the libraries of /usr, a shell with small programs, and the few files of
- * /etc that linking needs, read-only (a build all of /usr: compilers, headers), a /proc
- * of its own processes, and two places it may write, /box (its directory, where it starts) and /tmp, both in
- * memory and of a size that the kernel enforces. No network, no environment, no other user's files, no further
- * namespaces. Around it, in a second such machine, a few lines of shell unpack the submission, watch the memory
- * of all its processes together, kill what is left, and hand out the files that were asked for: regular files of
- * bounded size, never through a link that leads outside, as there is nothing outside. Whoever runs us as root
- * has the programs run by "nobody", since the kernel does not count root's processes.
+/* Runs untrusted programs. Each run gets a container of its own, made with bubblewrap (bwrap) in
+ * two nested layers.
  *
- * Limits of this: a filter refuses a few system calls, no more (a hole in the kernel is a way out); memory of all together is
- * watched five times a second where no control group can be made, not reserved, beyond what each process may have for itself. A machine that forbids user namespaces (many containers) has no sandbox.
+ * Inner layer. The program sees, read-only, the libraries of /usr, a shell with small tools, and the
+ * few files of /etc that linking needs (a build sees all of /usr, with compilers and headers); a
+ * /proc of its own processes; and two writable directories, /box (where it starts) and /tmp, both in
+ * memory and of a size that the kernel enforces. It has no network, none of our environment, no
+ * other user's files, and can make no further namespaces.
  *
- * Unsafe, as it is called, where namespaces are forbidden: as root, each run is made by a user of its own (run_user.h), of whom
- * nothing stays: all its processes are ended, its files removed; unpacking, copying and packing are done as that user, so that no link is
- * followed by root. System calls for what no limit counts, the network and other processes are refused by seccomp, files that are not the
- * system's or its own by Landlock (confine.h), where the kernel has these. Not kept: the limit of disk, and that of memory of all processes together where no control group (memory_group.h) can be made.
- * As another user, only the last two and the limits of a process hold. */
+ * Outer layer. A short shell script, the supervisor, unpacks the submission, watches the memory of
+ * all its processes together, kills what is left over, and hands out the requested files: regular
+ * files of bounded size. No link can lead outside, as nothing outside is visible. If we run as root,
+ * programs run as "nobody", since the kernel does not limit the number of root's processes.
+ *
+ * Limits. The filter of system calls refuses only a few, so a hole in the kernel is a way out. Where
+ * no control group can be made (memory_group.h), each process has its limit of memory, but that of
+ * all together is only checked five times a second. A machine that forbids user namespaces (many
+ * containers) has no sandbox.
+ *
+ * Without a sandbox ("unsafe"), where namespaces are forbidden:
+ *   as root        Each run has a user of its own (run_user.h). Afterwards all processes of that user
+ *                  are ended and all of its files removed. Unpacking, copying and packing are done as
+ *                  that user, so root follows no link.
+ *   as any user    seccomp refuses the network, other processes and memory that no limit counts;
+ *                  Landlock refuses files that are neither the system's nor the run's own
+ *                  (confine.h); both where the kernel has them. Limits of each process hold.
+ *   not kept       The limit of disk; that of memory of all processes together, where no control
+ *                  group can be made. */
 #ifndef ASSAY_SANDBOX_H
 #define ASSAY_SANDBOX_H
 
@@ -69,7 +79,7 @@ enum sandbox_end {
     SANDBOX_FILE_SIZE, /* wrote a file that is too large */
     SANDBOX_DISK,      /* failed with /box full */
     SANDBOX_UNPACK,    /* the submission does not fit into /box, or holds what cannot be unpacked */
-    SANDBOX_LOST /* the machine around it died, or had no room for what came out: our trouble */
+    SANDBOX_LOST /* the outer layer died, or had no room for the output: not the program's fault */
 };
 extern const char *const sandbox_end_name[]; /* "ok", "failed", "wall time", .. */
 
@@ -81,22 +91,22 @@ struct sandbox_result {
         [512]; /* one line, with the program's last lines, in printable ASCII; "" if SANDBOX_OK */
 };
 
-/* Looks whether the sandbox works here by running `true` in it. Fails with the reason where it does not;
- * with `unsafe` nothing is asked but that a program can be run. hidden: files and directories (NULL at the end) that no
- * program may read; only those below /usr need it. Our own programs and other renderers there are hidden besides. Makes out->dir. The
- * caller calls sandbox_close(). */
+/* Checks that the sandbox works here by running `true` in it, and fails with the reason if it does
+ * not; with `unsafe` only that a program can be run. hidden: files and directories (NULL at the end)
+ * that no program may read; only those below /usr need it. Our own programs and other renderers
+ * there are hidden besides. Makes out->dir. The caller calls sandbox_close(). */
 NODISCARD bool sandbox_open(bool unsafe, const char *const *hidden, struct sandbox *out,
                             struct err *e);
 /* Removes out->dir. */
 void sandbox_close(struct sandbox *s);
 
-/* One program. False only if the run could not be made, which is our trouble or the machine's; what the program
- * did wrong is in *out. May be called from several threads. */
+/* Runs one program. False only if the run could not be made, which is never the program's fault;
+ * what the program did wrong is in *out. May be called from several threads. */
 NODISCARD bool sandbox_run(const struct sandbox *s, const struct sandbox_job *job,
                            struct sandbox_result *out, struct err *e);
 
-/* A tar of a directory (or of one file) for struct sandbox_job, at most `most` bytes: links stay links. *too_large: it fails because of
- * that, and of nothing else. */
+/* Packs a directory (or one file) into a tar of at most `most` bytes for struct sandbox_job; links
+ * stay links. *too_large: it failed because of the size and of nothing else. */
 NODISCARD bool sandbox_pack(const char *path, const char *tar, size_t most, bool *too_large,
                             struct err *e);
 

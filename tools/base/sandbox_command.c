@@ -9,9 +9,12 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-/* Around the program; its arguments are the command that runs it. What it reports goes to a file that the
- * program cannot see; where there is no room for what is handed out, it reports nothing. TREE, SCENE, KEEP_TREE: "" or not; WATCH: KiB. bwrap does not wait for the process that it starts, so the program's processor time is found with
- * the one that inherits it, number 1 of the outer machine: cutime and cstime, fields 16 and 17 of its stat. */
+/* The supervisor, a shell script that runs in the outer layer; its arguments are the command that
+ * runs the program in the inner one. Its report, a line "STATUS WORD TICKS", goes to a file that the
+ * program cannot see; if there is no room for what is handed out, there is no report. TREE, SCENE,
+ * KEEP_TREE: "" or not; WATCH: KiB. bwrap does not wait for the process that it starts, so the
+ * program's processor time is found with process 1 of the outer layer, which inherits it: cutime and
+ * cstime, fields 16 and 17 of its stat. */
 static const char supervisor[] =
     "set -u\n"
     "umask 022\n"

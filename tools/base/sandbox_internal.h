@@ -1,4 +1,5 @@
-/* Shared by sandbox.c, by the commands that it runs, and by sandbox_bare.c, which runs programs without namespaces. */
+/* Shared by the parts of the sandbox: sandbox.c (with namespaces), sandbox_bare.c (without),
+ * sandbox_command.c (command lines) and sandbox_conclude.c (why a run ended). */
 #ifndef ASSAY_SANDBOX_INTERNAL_H
 #define ASSAY_SANDBOX_INTERNAL_H
 
@@ -15,18 +16,20 @@ struct sandbox_line {
     bool overflow;
 };
 
-/* bwrap, the supervisor in it, and in that the program. keep: the names, with blanks between them. */
+/* Appends bwrap (the outer layer), the supervisor, bwrap (the inner layer) and the program. keep:
+ * the names of job->keep, with blanks between them. */
 void sandbox_line_boxed(struct sandbox_line *l, const struct sandbox *s,
                         const struct sandbox_job *job, const char *keep);
-/* The program with its limits and its environment. box: where it starts; temp: its TMPDIR. */
+/* Appends the program with its limits and its environment. box: where it starts; temp: its TMPDIR. */
 void sandbox_line_bare(struct sandbox_line *l, const struct sandbox_job *job, const char *box,
                        const char *temp);
 
-/* What a run may have of memory, files in it included, where the kernel counts it (memory_group.h). */
+/* The limit of memory of a whole run in bytes, files in memory included (memory_group.h). */
 size_t sandbox_all_memory(const struct sandbox_limits *limit);
 
-/* Fills in r->end and r->why from r->status, r->wall_s and r->cpu_s. word: what else is known ("memory", "disk", "unpack"); NULL: it was killed
- * before it ended. last: of process_run(). */
+/* Fills in r->end and r->why from r->status, r->wall_s and r->cpu_s. word: what the supervisor
+ * reported ("ended", "memory", "disk", "unpack"); NULL: it was killed before it could. last: what
+ * process_run() said. */
 void sandbox_conclude(const struct sandbox_job *job, const char *word, const struct err *last,
                       struct sandbox_result *r);
 

@@ -1,4 +1,5 @@
-/* All regions of one channel of a claim, tested from band to band of rows. Used by compare.c only. */
+/* Tests all regions of one channel of a claim, one band of rows after the other. For luminance it
+ * also fills the maps of the comparison (z and relative difference). Used by compare.c only. */
 #ifndef ASSAY_CHANNEL_SWEEP_H
 #define ASSAY_CHANNEL_SWEEP_H
 

@@ -73,8 +73,8 @@ void error_modes_go_to(struct error_modes *modes, int y, int rows);
 /* One direction in one row of these, by columns. */
 struct error_change {
     double *d[3]; /* free of what is seen in the pixel */
-    /* Variance of sum w D beyond that of D, because d in p is made of pixels in which d is made of p:
-     * their product's mean does not vanish where d is B alone. */
+    /* Extra variance of sum w D. The direction at p is computed from other pixels, whose directions
+     * in turn are computed from p; where d is made of B alone, these products do not average out. */
     double *coupled;
 };
 void error_mode_row(const struct error_modes *modes, enum error_mode_kind kind, int y,

@@ -24,8 +24,8 @@ struct value {
     double mean, var;
 };
 
-/* Blocks that stand for all, what they hold of A and B, one after the other, and, where they are changed by many amounts, of B
- * what a shift might bring there. */
+/* A sample of blocks that stands for the whole image: their pixels in A and B, block after block, and, where a shift by
+ * many amounts is tried, strips of B that hold what it may bring in. */
 struct sample {
     int step; /* each step-th block */
     struct value (*side[2])[3];
@@ -253,8 +253,10 @@ static double standard_errors(const struct excess *e, int k)
     return e->num[k] > 0 ? e->before[k] / sqrt(2 * 3 * (double)e->num[k]) : 0;
 }
 
-/* Judged where the difference stands out most from noise. If it stands out nowhere (noise that was guessed from the
- * difference takes much of it for its own), noise and all: no change removes noise. -1: few pixels have a partner. */
+/* The share of the squared difference that the change removes, at the scale (pixels or blocks) at
+ * which the difference stands out most from the noise. If it stands out at neither, as where the
+ * noise was estimated from the difference itself, noise is included on both sides of the ratio: no
+ * change removes noise. -1: too few pixels have a counterpart in B. */
 static double removed_by(const struct images *m, enum error_mode_kind kind, double amount,
                          const struct sample *sample)
 {

@@ -98,8 +98,9 @@ static bool check_shared(const struct moments *a, const struct moments *b, struc
     return true;
 }
 
-/* Parts of alpha. What does not apply gives its part to the others, in proportion. That is a matter of
- * options and kind of input: by the data it would be a choice among tests. */
+/* Shares of alpha. The share of a statistic that does not apply goes to the others in proportion.
+ * This depends on options and the kind of input only: if it depended on the data, the data would
+ * choose among tests. */
 static void set_shares(const struct moments *a, const struct moments *b, struct judge *j)
 {
     static const double part[NUM_STATISTICS] = {.25, .40, .10, .15, .10};

@@ -18,9 +18,10 @@ static double larger(double a, double b)
     return a > b ? a : b;
 }
 
-/* A or B in pixels number `at` and on, their channels weighted. Their correlation is unknown: see pyramid_pixel_estimate(). Where
- * weights have both signs the third cumulants of the channels are added all the same: that they cancel if
- * the channels are perfectly correlated is no permission. */
+/* Estimates of one side (A or B) for `num` pixels from number `at` on, the channels combined with
+ * the weights t->w. Their correlation is unknown; the bounds are those of pyramid_pixel_estimate().
+ * Third cumulants are added with |w| even where weights have both signs: that they would cancel for
+ * perfectly correlated channels must not be relied on. */
 ISA_CLONES static void weigh(const struct error_modes_frame *f, int side, size_t at, size_t num,
                              struct chunk *t)
 {

@@ -98,7 +98,9 @@ static double larger(double a, double b)
     return a > b ? a : b;
 }
 
-/* At the normal critical value x, as t is further out. Most are so far beyond that squares tell it, without a root. */
+/* Does the skewness factor exceed `limit` at the normal critical value x? Student's critical value
+ * is larger, so the true factor is, too. Most regions exceed the limit by so much that squares
+ * decide it, without a square root. */
 static bool is_beyond(const struct cell *cell, double x, double limit)
 {
     const double v = cell->va + cell->vb, of_one = skew_factor(1, x),

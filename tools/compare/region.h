@@ -35,8 +35,9 @@ struct measured {
     double skew_around; /* the same as what lies around has it; INFINITY: not asked */
     double t_guard;     /* critical value at which skewness is judged */
     double log10_alike; /* of the cell */
-    /* One side, which is no closed form, shows no noise where the other does: its few samples may all have
-     * been alike, as where roulette ends one path in twenty, and lie off for that. */
+    /* One side (not a closed form) shows no noise where the other does. Its few samples may all
+     * have been alike by chance, as where roulette ends one path in twenty, and its mean may be off
+     * for that reason. */
     bool silent;
     bool noise_free; /* the standard error is within that of float32 arithmetic */
     int statistic;   /* by which it is tested */
@@ -57,20 +58,25 @@ double region_pixel_t(const struct judge *j, const struct cell *cell, double *re
 struct measured region_measure_weighted(const struct judge *j, const struct cell *cell, double unit,
                                         double size);
 
-/* What the skewness, unless it forbids a test by itself, would be if third cumulants were to variances as in a larger region
- * around this one: a small one whose few samples look harmless may be so by luck, and lie off for that. The image needs none. */
+/* Fills m->skew_around: the skewness that this region would have with the ratio of third cumulant
+ * to variance of a larger region around it. A small region can look symmetric by luck, because its
+ * few samples missed the rare bright ones; its mean is then too low. Not needed for the whole
+ * image, nor where the region's own skewness already forbids a test. */
 void region_look_around(const struct judge *j, struct measured *m, const struct cell *around);
 
-/* Not silent, and the skew guard: |g| x^3 / 3 <= 0.2 at the critical x; region_testable() lets pass silent ones, and 4 and
- * |g| x <= 0.3 where the surroundings say no more than that, too: p makes up for both. */
+/* region_is_normal(): the region is not silent, and its skewness factor |g| x^3 / 3 is at most 0.2
+ * at the critical value x. region_testable(): silent regions pass, too, and so do factors up to 4
+ * with |g| x <= 0.3, if the skewness of the surroundings is within these bounds as well.
+ * region_log10_p() raises p to make up for both. */
 bool region_is_normal(const struct judge *j, const struct measured *m);
 bool region_testable(const struct judge *j, const struct measured *m);
 
 /* How far |d| lies beyond margin and tolerance, in standard errors; at most 0 if it does not. */
 double region_excess_t(const struct measured *m);
 
-/* Two-sided log10 p of "|bias| <= margin", raised by the skew factor where the guard asks for it, and of a silent region to the
- * chance that what makes the difference has been missed. */
+/* Two-sided log10 p of the hypothesis |bias| <= margin. The skewness factor raises it where the
+ * guard asks for that. For a silent region it is at least the probability that bright samples which
+ * would explain the difference were all missed. */
 double region_log10_p(const struct judge *j, const struct measured *m, int channel);
 
 /* About the normal equivalent of that p, good to 3 %, of a region with noise: for ranking only. */

@@ -12,7 +12,7 @@ struct observation {
     struct signature seen; /* with the facts that are known */
     bool is_consistent; /* false: a claim of consistency came out DIFFERENT at its share of alpha */
     double
-        margin; /* relative: by what conventions another program may differ from ours; 0: not at all */
+        margin; /* relative: how far another program may differ from ours by convention; 0: not at all */
 };
 
 struct diagnose_options {
@@ -20,8 +20,9 @@ struct diagnose_options {
     const char
         *without; /* a bug to leave out of the hypotheses, as if it were not known; NULL: none */
     bool
-        by_likelihood; /* no other test says that something is wrong, as for images that state no error: a bug has
-                        * to lead by diagnose_bound(), and to explain what is clear */
+        by_likelihood; /* no other test shows that something is wrong, as for images that state no
+                        * error. A bug must then exceed "correct" by diagnose_bound() and explain
+                        * what stands out from noise */
     bool pairs;  /* where no single one explains: two bugs at once, with by_likelihood */
     double clip; /* radiance at which views are cut off; 0: none */
 };
@@ -33,8 +34,10 @@ struct candidate {
     double amplitude;      /* 1: its full effect; else the factor that fits best */
     double log_likelihood; /* natural logarithm, over that of "correct" */
     double
-        explained; /* share of what is clear of the difference from the correct renderer, at most 1; NAN if nothing is */
-    double excess; /* chi^2 of what is left over its mean, in its standard deviations */
+        explained; /* of the part of the difference from the correct renderer that stands out from
+                    * noise: the share that this candidate explains, at most 1; NAN if nothing
+                    * stands out */
+    double excess; /* chi^2 of the residual minus its expectation, in standard deviations */
 };
 
 /* How a bug explains one view. */

@@ -1,5 +1,6 @@
-/* One mistake is paid once. What an earlier part did wrong shows in all later ones: they are judged against images with
- * the same mistake. Which part pays, and the formulas: tools/docs/background/grading.md. */
+/* Each mistake costs points once. A bug in an earlier part of the assignment spoils the images of
+ * later parts too, so those are compared with references that contain the same bug. Which part
+ * loses the points, and the formulas: tools/docs/background/grading.md. */
 #ifndef ASSAY_CARRIED_H
 #define ASSAY_CARRIED_H
 

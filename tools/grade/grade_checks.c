@@ -127,8 +127,9 @@ static void model_noise(const struct work *w, const unsigned char *use, const do
         submitted_image_scale_skewness(&w->g->h->image[w->check->images[k]], use);
 }
 
-/* Fills w->use. What is noisier than our renders reaches the clipping point from further away; where that leaves too little, and
- * more samples can be had, they are needed first. False: our trouble. */
+/* Fills w->use, the pixels that can be compared. Around the clipping point a program that is
+ * noisier than ours loses more pixels. If fewer than 30 % would be left, out->more asks for more
+ * samples instead. False: our failure, not the submission's. */
 static bool find_usable(struct work *w, struct result *out, struct err *e)
 {
     static const double louder = 1.3, fewest = 0.3;
@@ -163,8 +164,9 @@ static bool find_usable(struct work *w, struct result *out, struct err *e)
     return true;
 }
 
-/* The noise of the reference itself, in an image that should have noise of its own: a copy. A share of values
- * that lie in their code's bin around the reference, where only chance would put so many of them. */
+/* A copy of the reference: an image that should have noise of its own shows the reference's. More
+ * than 98 % of at least 100 values lie in their code's bin around the reference, where chance would
+ * put fewer than 60 %. */
 static bool is_copy(const struct submitted_image *s, const struct moments *m, double spp,
                     const unsigned char *use)
 {
@@ -216,7 +218,8 @@ static void judge(const struct work *w, const struct margin *m, const struct int
     out->share = fmin(out->share, share);
 }
 
-/* What is lost is lost; what cannot be seen yet is not. */
+/* A check that has lost all its points is decided. A check whose images cannot be compared yet (blind) keeps its points
+ * while more samples can be had. */
 static void settle(const struct work *w, bool blind, struct result *out)
 {
     if (blind && can_buy(w))

@@ -1,4 +1,5 @@
-/* From images to points: the checks of a rubric on one submission. */
+/* From images to points: runs the checks of a rubric on one submission, and writes what was
+ * expected and seen, the text of the student's page (tools/gradebook/student_page.c). */
 #ifndef ASSAY_GRADE_CHECKS_H
 #define ASSAY_GRADE_CHECKS_H
 
@@ -48,9 +49,10 @@ NODISCARD bool answer_key_render(const struct rubric *r, int image, bool as_aske
  * margin.none away, linear between. */
 double score_share(const struct margin *m, const struct interval *i);
 
-/* An interval that is wide for noise comes near to 0 whatever is wrong: where half its width is more than margin.none, the
- * share says nothing yet. How many times the samples it takes to change that; 0: none, as it is decided. blur: the part of
- * half its width that samples do not mend. */
+/* A noisy image has a wide interval, which comes near 0 whatever is wrong. While half its width is
+ * more than margin.none, the share says nothing. Returns the factor by which the samples have to
+ * grow to change that; 0 if the share is decided. blur: the part of half the width that more
+ * samples do not reduce. */
 double score_more(const struct margin *m, const struct interval *i, double blur);
 
 /* Where no more samples can be had, width costs points: 1 up to margin.none, 0 from twice that. */
@@ -116,10 +118,11 @@ void grade_checks_growth(const struct grading *g, const struct rubric_check *c, 
 void grade_checks_rates(const struct grading *g, int set, const struct rubric_check *c,
                         struct result *out);
 
-/* All checks, out[0 .. num_checks-1], against the set of deviations that leaves the most points: the empty one unless
- * another brings 1 % of all points more and some image that is wrong without it is right with it, and not for its noise: a bug that
- * looks a little like it is not taken for it. What a program does wrong besides still costs. On failure there
- * is nothing to free. */
+/* All checks, out[0 .. num_checks-1], graded with the set of accepted deviations that leaves the
+ * most points. The empty set wins unless another brings more than 1 % of all points and some check of
+ * an image that loses points without it loses none with it, and not because it is noisy: a bug that
+ * merely resembles a deviation is not excused. Other mistakes still cost points. On failure
+ * there is nothing to free. */
 NODISCARD bool grade_all_checks(const struct grading *g, struct result *out, int *set,
                                 struct err *e);
 void result_free(struct result *r);

@@ -5,7 +5,8 @@
 
 #include <stdio.h>
 
-/* A bug on top of deviations that were not recognised, as it spoils all images that show them. */
+/* Grades the checks that lost points again, with the deviations of `set`, and keeps what is better:
+ * a bug can spoil every image that shows the deviations, so that they were not recognised before. */
 static bool grade_with(const struct grading *g, int set, struct result *result, struct err *e)
 {
     for (int i = 0; i < g->r->num_checks; i++) {

@@ -64,14 +64,16 @@ void submitted_image_scale_skewness(struct submitted_image *s, const unsigned ch
 /* dst += src, clipped where either is, measured where both are; one made of nothing, black, is. */
 void submitted_image_add(struct submitted_image *dst, const struct submitted_image *src);
 
-/* What can be compared with a render of spp samples a pixel, told by the moments of one of ours: use[p] becomes 0
- * within 5 standard errors of the clipping point (measured: those of its smallest run too, from run to run), and beside such pixels and beside clipped ones, whose variance says
- * nothing of their neighbours', and where the variance is more than 20 times the mean of the image. use: one per pixel, set by the caller to not 0. */
+/* Clears use[p] where s cannot be compared with a render of spp samples per pixel, judged by the
+ * moments of one of ours: within 5 standard errors of the clipping point (measured: also by the
+ * standard errors from run to run, of the smallest run); beside such pixels and beside clipped
+ * ones, whose variance says nothing about their neighbours; and where the variance is more than 20
+ * times the image's mean. The caller sets use[] to nonzero before. */
 NODISCARD bool submitted_image_comparable(const struct submitted_image *s, const struct moments *m,
                                           double spp, bool measured, unsigned char *use,
                                           struct err *e);
 
-/* The same without knowing better: not 0 but where s is clipped, and beside it. */
+/* The same without a reference: use[p] becomes 0 where s is clipped and beside that, elsewhere nonzero. */
 void submitted_image_unclipped(const struct submitted_image *s, unsigned char *use);
 
 /* Standard deviation that channel i (3 per pixel) of a render of spp samples has, by the reference's samples. */

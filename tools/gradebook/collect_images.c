@@ -80,8 +80,8 @@ static int repeats_of(const struct rubric *r, const struct submitted_images *h, 
     return num - 1;
 }
 
-/* No program makes one image of three scenes; some scene may look like it. What is of one colour is judged: a program without
- * light is black. */
+/* Refuses images that were handed in unchanged for three or more scenes; two scenes may look alike.
+ * Images of one colour are kept and judged: a program without light renders black. */
 static void refuse_repeated(const struct rubric *r, struct submitted_images *h)
 {
     enum { MOST = 1 };

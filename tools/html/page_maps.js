@@ -1,4 +1,5 @@
-// What is made of two images, pixel by pixel, and how numbers become colours.
+// Computes the pixels of the maps of two images (difference, t, error, variance ratio, samples) and
+// their colours; page_view.js draws them.
 
 const lutElement = document.getElementById("colours");
 // Red, green, blue of 257 steps of the diverging map, then of 256 of the sequential one.

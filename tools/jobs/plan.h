@@ -1,6 +1,6 @@
-/* Work cut into jobs that can run anywhere, in any order, again: each is a program with its words, knows its inputs by
- * hash and leaves one artefact, DIR/jobs/KEY, a directory that appears by rename. The files: tools/docs/formats/plan.md;
- * how to use it: tools/docs/guide-cluster.md. */
+/* Splits a command into jobs that can run on any machine, in any order, and more than once. A job is a program with its
+ * arguments; it knows its inputs by hash and leaves one artefact, the directory DIR/jobs/KEY, which appears by rename.
+ * Files: tools/docs/formats/plan.md. Use: tools/docs/guide-cluster.md. */
 #ifndef ASSAY_PLAN_H
 #define ASSAY_PLAN_H
 

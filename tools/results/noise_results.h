@@ -1,6 +1,7 @@
-/* "noise" in results.json (tools/docs/formats/results.md): of each scene and engine the variance of a sample, its fall with
- * the number of samples, and, of ours, what both were judged by (tools/validate/noise_claims.c). An engine that is not
- * judged is "MEASURED", one of which nothing is stored has "not_stored"; both pass. */
+/* The member "noise" of results.json (tools/docs/formats/results.md): per scene and engine the
+ * variance of one sample and how it falls with the number of samples; for our renderer also what
+ * both were judged by (tools/validate/noise_claims.c). An engine that is not judged has the verdict
+ * "MEASURED", one without stored noise has "not_stored"; both pass. */
 #ifndef ASSAY_NOISE_RESULTS_H
 #define ASSAY_NOISE_RESULTS_H
 

@@ -1,5 +1,6 @@
-/* "consistency" in results.json (tools/docs/formats/results.md): claims about the error that our renders state
- * (stated_error.h). pixels and image are 0 where two renders are the same. */
+/* The member "consistency" of results.json (tools/docs/formats/results.md): does the error that our
+ * renders state agree with the error between them (stated_error.h)? The ratios "pixels" and "image"
+ * are 0 where two renders are the same. */
 #ifndef ASSAY_STATED_ERROR_RESULTS_H
 #define ASSAY_STATED_ERROR_RESULTS_H
 

@@ -1,7 +1,9 @@
-/* A claim judged at looks of growing size, with its error rate kept.
+/* Group-sequential testing: one claim is judged at several looks with growing numbers of samples,
+ * and alpha spending keeps its error rate. How the alpha of a run is divided among its claims:
+ * tools/validate/validate.c.
  *
  * Sizes of the looks, in units of the scene's declared samples, and what part of the claim's alpha each
- * may spend, are constants: nothing that is seen changes them. With alpha_l = share_l alpha, compare.h
+ * may spend, are constants: nothing in the images changes them. With alpha_l = share_l alpha, compare.h
  * bounds the chance of a wrong DIFFERENT, and of a wrong EQUIVALENT, at look l by alpha_l. Whatever the
  * rule by which looks end (decided, the time is over, someone loses patience), a wrong verdict needs one
  * look to be wrong, so its chance is at most sum_l alpha_l <= alpha: the union bound, for any

@@ -1,5 +1,6 @@
-/* How much the pixels of an engine scatter: over the image and over each tile, with intervals that ask nothing of the
- * law of the noise, only that pixels are independent. Values are relative (convergence_rate.h: each is divided by a
+/* The variance of an engine's pixel values, over the image and over each tile, with confidence
+ * intervals that assume nothing about the distribution of the noise, only that pixels are
+ * independent. Values are relative (convergence_rate.h: each is divided by a
  * unit of its own). Of pixel p, channels c and K >= 3 replicates k with seeds of their own:
  *
  *   between  d_k = sum_c (x_kc - m_c)^2 / u_c^2, V_p = sum_k d_k / (3 (K-1))       m: their mean
