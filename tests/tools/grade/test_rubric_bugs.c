@@ -20,22 +20,22 @@ static int tear_down(void **state)
 }
 
 /* without: a bug that is taken to be unknown; NULL: none. */
-static struct diagnosis find(int set, int bug, int second, double noise, int graded,
-                             const char *without, int *with)
+static struct diagnosis find(const struct bug_images *b, int set, int bug, int second, double noise,
+                             int graded, const char *without, int *with)
 {
-    struct submitted_images *h = bug_images_hand_in(&of, set, bug, second, noise);
+    struct submitted_images *h = bug_images_hand_in(b, set, bug, second, noise);
     struct diagnosis found;
     struct err e;
-    MUST(rubric_bugs_diagnose(&(struct grading){of.rubric, of.answers, h, 1e-5, &of.bugs}, graded,
+    MUST(rubric_bugs_diagnose(&(struct grading){b->rubric, b->answers, h, 1e-5, &b->bugs}, graded,
                               without, &found, with, &e));
-    bug_images_take_back(&of, h);
+    bug_images_take_back(b, h);
     return found;
 }
 
 /* The name of the likeliest, "" if there is none. */
 static const char *name(int set, int bug, double noise, int graded, int *with, int *named)
 {
-    struct diagnosis found = find(set, bug, -1, noise, graded, NULL, with);
+    struct diagnosis found = find(&of, set, bug, -1, noise, graded, NULL, with);
     *named = found.num_named;
     return found.num_named > 0 ? of.bugs.catalogue.bug[found.candidate[0].bug].name : "";
 }
@@ -82,48 +82,39 @@ TEST(masked_images_have_names)
     assert_true(masked.rubric->mask[2] > 0);
     for (size_t i = 0; i < COUNT(known); i++) {
         int bug = bug_images_number(&masked, known[i]), with;
-        struct submitted_images *h = bug_images_hand_in(&masked, 0, bug, -1, 1);
-        struct diagnosis found;
-        struct err e;
-        MUST(rubric_bugs_diagnose(
-            &(struct grading){masked.rubric, masked.answers, h, 1e-5, &masked.bugs}, 0, NULL,
-            &found, &with, &e));
-        bug_images_take_back(&masked, h);
+        struct diagnosis found = find(&masked, 0, bug, -1, 1, 0, NULL, &with);
         if (found.num_named != 1 || found.candidate[0].bug != bug)
             fail_msg("%s: %d named", known[i], found.num_named);
     }
     bug_images_end(&masked);
 }
 
-/* Two of different parts, in either order. */
+/* Whether both, in either order, and no others, are named where their effects are that far apart (struct bug_images). */
+static bool both_are_named(const char *one, const char *two, double apart, double *excess)
+{
+    const int a = bug_images_number(&of, one), b = bug_images_number(&of, two);
+    int with;
+    of.apart = apart;
+    struct diagnosis found = find(&of, 0, a, b, 1, 0, NULL, &with);
+    of.apart = 0;
+    assert_int_equal(with, 0);
+    const struct candidate *c = &found.candidate[0];
+    *excess = c->excess;
+    return found.num_named == 1 &&
+           ((c->bug == a && c->second == b) || (c->bug == b && c->second == a));
+}
+
+/* Two of different parts. */
 TEST(two_bugs_have_both_names)
 {
     static const char *const known[][2] = {{"cosine_missing", "depth_one_short"},
                                            {"upside_down", "emission_twice"},
                                            {"diffuse_without_pi", "roulette_not_divided"},
                                            {"light_area_doubled", "roulette_squared"}};
-    for (size_t i = 0; i < COUNT(known); i++) {
-        int a = bug_images_number(&of, known[i][0]), b = bug_images_number(&of, known[i][1]), with;
-        struct diagnosis found = find(0, a, b, 1, 0, NULL, &with);
-        const struct candidate *c = &found.candidate[0];
-        if (found.num_named != 1 || with != 0 ||
-            !((c->bug == a && c->second == b) || (c->bug == b && c->second == a)))
-            fail_msg("%s and %s: %d named", known[i][0], known[i][1], found.num_named);
-    }
-}
-
-/* Whether both, and no others, are named where their effects are that far apart (struct bug_images). */
-static bool both_are_named(const char *one, const char *two, double apart, double *excess)
-{
-    const int a = bug_images_number(&of, one), b = bug_images_number(&of, two);
-    int with;
-    of.apart = apart;
-    struct diagnosis found = find(0, a, b, 1, 0, NULL, &with);
-    of.apart = 0;
-    const struct candidate *c = &found.candidate[0];
-    *excess = c->excess;
-    return found.num_named == 1 &&
-           ((c->bug == a && c->second == b) || (c->bug == b && c->second == a));
+    double excess;
+    for (size_t i = 0; i < COUNT(known); i++)
+        if (!both_are_named(known[i][0], known[i][1], 0, &excess))
+            fail_msg("%s and %s", known[i][0], known[i][1]);
 }
 
 /* Light that bounces find by themselves adds to what is left of direct light; a wider view shows another part of a floor, so that
@@ -158,7 +149,7 @@ TEST(an_unknown_bug_has_no_name)
     for (size_t i = 0; i < COUNT(unknown); i++) {
         int with;
         struct diagnosis found =
-            find(0, bug_images_number(&of, unknown[i]), -1, 1, 0, unknown[i], &with);
+            find(&of, 0, bug_images_number(&of, unknown[i]), -1, 1, 0, unknown[i], &with);
         if (found.num_named > 0)
             fail_msg("%s is called %s", unknown[i],
                      of.bugs.catalogue.bug[found.candidate[0].bug].name);
