@@ -68,6 +68,16 @@ const char *test_course_file(const char *name);
  * 1e-6 of the expected one. A line of the file that begins with "; " is a remark, and is left out. */
 void test_same_text(const char *text, const char *expected);
 
+/* text: what these calls write to the stream `f`; the caller frees. */
+#define PRINTED(text, ...)                                                                         \
+    do {                                                                                           \
+        size_t size_;                                                                              \
+        FILE *f = open_memstream(&(text), &size_);                                                 \
+        assert_non_null(f);                                                                        \
+        __VA_ARGS__;                                                                               \
+        assert_int_equal(fclose(f), 0);                                                            \
+    } while (0)
+
 /* In double precision, unlike cmocka's own. */
 #define assert_near(a, b, tolerance)                                                               \
     do {                                                                                           \

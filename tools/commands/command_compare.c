@@ -1,11 +1,8 @@
-#include "renderer/base/fs.h"
 #include "renderer/base/cli.h"
 #include "tools/validate/compare_job.h"
 #include "tools/compare/region.h"
 #include "tools/compare/verdict.h"
-#include "tools/report/report.h"
 #include "tools/results/results.h"
-#include "tools/base/temp_dir.h"
 #include "commands.h"
 
 #include <math.h>
@@ -186,20 +183,6 @@ static void print_result(const struct compare_job *job, const struct compared *c
         printf("for CI: --margin D exits with 0 where both are shown to be equal within D\n");
 }
 
-/* The page is made from a results.json, as every page is; this one goes with its directory. */
-static bool write_report(const struct settings *s, const struct compared *c, int argc, char **argv,
-                         struct err *e)
-{
-    struct temp_dir dir;
-    if (!temp_dir_open(&dir, "compare", e))
-        return false;
-    const struct path results = fs_path("%s/results.json", dir.path);
-    bool ok = compare_job_write_json(&s->job, c, results.s, argc, argv, e) &&
-              report_write(results.s, s->report, e);
-    struct err ignored = {0};
-    return temp_dir_close(&dir, ok ? e : &ignored) && ok;
-}
-
 int command_compare(int argc, char **argv, struct err *e)
 {
     struct settings s = {.job.opt = {.alpha = 1e-3, .margin_tile = -1, .tile = 16}};
@@ -219,7 +202,7 @@ int command_compare(int argc, char **argv, struct err *e)
         print_result(&s.job, &c);
     if (s.json != NULL && !compare_job_write_json(&s.job, &c, s.json, argc, argv, e))
         code = EXIT_NOT_JUDGED;
-    if (s.report != NULL && !write_report(&s, &c, argc, argv, e))
+    if (s.report != NULL && !compare_job_write_report(&s.job, &c, s.report, argc, argv, e))
         code = EXIT_NOT_JUDGED;
     compare_job_free(&c);
     return code;

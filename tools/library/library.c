@@ -1,10 +1,7 @@
 #include "assay.h"
 
 #include "library_internal.h"
-#include "renderer/base/fs.h"
 #include "renderer/base/version.h"
-#include "tools/base/temp_dir.h"
-#include "tools/report/report.h"
 #include "tools/validate/compare_job.h"
 
 #include <math.h>
@@ -234,30 +231,22 @@ const float *assay_relative_map(const struct assay_comparison *comparison, int *
     return map_of(&comparison->c.r.relative, width, height);
 }
 
-static bool write_json(const struct assay_comparison *c, const char *path, struct err *e)
-{
-    char *argv[] = {"compare", c->name[0], c->name[1], NULL};
-    return compare_job_write_json(&c->job, &c->c, path, 3, argv, e);
-}
-
 bool assay_write_json(const struct assay_comparison *comparison, const char *path,
                       char error[ASSAY_ERROR_SIZE])
 {
+    char *argv[] = {"compare", comparison->name[0], comparison->name[1], NULL};
     struct err e = {""};
-    return library_told(write_json(comparison, path, &e), &e, error);
+    return library_told(compare_job_write_json(&comparison->job, &comparison->c, path, 3, argv, &e),
+                        &e, error);
 }
 
 bool assay_write_report(const struct assay_comparison *comparison, const char *path,
                         char error[ASSAY_ERROR_SIZE])
 {
-    struct err e = {""}, ignored;
-    struct temp_dir dir;
-    if (!temp_dir_open(&dir, "library", &e))
-        return library_told(false, &e, error);
-    const struct path results = fs_path("%s/results.json", dir.path);
-    bool ok = write_json(comparison, results.s, &e) && report_write(results.s, path, &e);
-    ok = temp_dir_close(&dir, ok ? &e : &ignored) && ok;
-    return library_told(ok, &e, error);
+    char *argv[] = {"compare", comparison->name[0], comparison->name[1], NULL};
+    struct err e = {""};
+    return library_told(
+        compare_job_write_report(&comparison->job, &comparison->c, path, 3, argv, &e), &e, error);
 }
 
 void assay_free(struct assay_comparison *comparison)

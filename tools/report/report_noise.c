@@ -9,7 +9,7 @@ static size_t count(const json_t *noise, bool good)
     size_t n = 0;
     json_each(row, noise) {
         bool judged = member_text(row, "against") != NULL || member_text(row, "error") != NULL;
-        n += judged && (!good || noise_results_outcome(row) == OUTCOME_AS_EXPECTED);
+        n += judged && (!good || results_row_outcome(row) == OUTCOME_AS_EXPECTED);
     }
     return n;
 }
@@ -33,10 +33,10 @@ void report_noise(FILE *f, const json_t *noise)
                     "Scene|Engine|Variance of a sample|Of the noisiest tile|Over that of|Slope|"
                     "Efficiency [1/s]|Verdict");
     json_each(row, noise) {
-        html_row_open(f, noise_results_outcome(row) != OUTCOME_AS_EXPECTED,
+        html_row_open(f, results_row_outcome(row) != OUTCOME_AS_EXPECTED,
                       member_text(row, "scene"));
-        for (int c = 1; c < NOISE_COLUMNS; c++) {
-            char text[NOISE_CELL];
+        for (size_t c = 1; c < NOISE_COLUMNS; c++) {
+            char text[TEXT_TABLE_CELL];
             noise_results_cell(row, c, text);
             html_print(f, "<td>%s</td>", text);
         }

@@ -7,7 +7,7 @@ static size_t count_good(const json_t *consistency)
 {
     size_t good = 0;
     for (size_t i = 0; i < json_array_size(consistency); i++)
-        good += stated_error_outcome(json_array_get(consistency, i)) == OUTCOME_AS_EXPECTED;
+        good += results_row_outcome(json_array_get(consistency, i)) == OUTCOME_AS_EXPECTED;
     return good;
 }
 
@@ -22,7 +22,7 @@ void report_stated_error_headline(FILE *f, const json_t *consistency)
 
 static void write_row(FILE *f, const json_t *c)
 {
-    bool good = stated_error_outcome(c) == OUTCOME_AS_EXPECTED;
+    bool good = results_row_outcome(c) == OUTCOME_AS_EXPECTED;
     html_row_open(f, !good, member_text(c, "scene"));
     if (member_text(c, "error") != NULL) {
         html_print(f, "<td colspan=\"7\" class=\"error-cell\">%s</td></tr>\n",

@@ -2,6 +2,7 @@
 
 #include "json_shape.h"
 #include "reference/suite/suite.h"
+#include "tools/base/text_table.h"
 
 #include <string.h>
 
@@ -85,13 +86,6 @@ static enum outcome outcome_of(const char *verdict)
     if (strcmp(verdict, "DIFFERENT") == 0)
         return OUTCOME_OPPOSITE;
     return strcmp(verdict, "INCONCLUSIVE") == 0 ? OUTCOME_UNDECIDED : OUTCOME_AS_EXPECTED;
-}
-
-enum outcome convergence_results_outcome(const json_t *engine)
-{
-    if (json_object_get(engine, "error") != NULL)
-        return OUTCOME_NOT_JUDGED;
-    return outcome_of(member_text(engine, "verdict"));
 }
 
 /* "name [lo, hi]", or without the interval where there is none; "-" where there is no number. */
@@ -219,11 +213,10 @@ static void print_markdown_row(void *ctx, const struct convergence_row *r)
     FILE *f = ctx;
     for (size_t i = 0; i < sizeof cell / sizeof *cell; i++) {
         fputs("| ", f);
-        for (const char *c = cell[i]; *c != '\0'; c++) {
-            if (strchr("|\\`*_[]", *c) != NULL && i != 3)
-                fputc('\\', f);
-            fputc(*c == '\n' ? ' ' : *c, f);
-        }
+        if (i == 3) /* "-0.5 [-0.51, -0.49]" */
+            fputs(cell[i], f);
+        else
+            text_table_escape(f, cell[i]);
         fputc(' ', f);
     }
     fputs("|\n", f);

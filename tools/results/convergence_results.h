@@ -19,9 +19,6 @@ NODISCARD bool convergence_results_check(const json_t *convergence, const char *
 NODISCARD bool convergence_results_check_depths(const json_t *depths, const char *where,
                                                 struct err *e);
 
-/* How an engine came out; MEASURED is as expected. */
-enum outcome convergence_results_outcome(const json_t *engine);
-
 /* One line "scene x engine x quantity" of one element of "convergence". Texts are valid until the callback
  * returns. */
 struct convergence_row {

@@ -53,17 +53,6 @@ bool noise_results_check(const json_t *noise, const char *path, struct err *e)
     return true;
 }
 
-enum outcome noise_results_outcome(const json_t *row)
-{
-    enum verdict v;
-    const char *verdict = member_text(row, "verdict");
-    if (json_is_true(json_object_get(row, "passed")))
-        return OUTCOME_AS_EXPECTED;
-    if (verdict == NULL || !verdict_parse(verdict, &v))
-        return OUTCOME_NOT_JUDGED;
-    return v == VERDICT_DIFFERENT ? OUTCOME_OPPOSITE : OUTCOME_UNDECIDED;
-}
-
 json_t *noise_results_claims(const json_t *noise)
 {
     json_t *claims = json_array();
@@ -90,32 +79,28 @@ json_t *noise_results_claims(const json_t *noise)
     return claims;
 }
 
-const char *const noise_results_headings[NOISE_COLUMNS] = {
-    "scene",        "engine", "variance of a sample", "of the noisiest tile",
-    "over that of", "slope",  "efficiency",           "verdict"};
-
-static void print_estimate(char text[NOISE_CELL], const json_t *j, const char *name,
+static void print_estimate(char text[TEXT_TABLE_CELL], const json_t *j, const char *name,
                            const char *format, const char *format_ci)
 {
     char ci[32];
     snprintf(ci, sizeof ci, "%s_ci", name);
     if (json_object_get(j, name) == NULL)
         return;
-    text_append(text, NOISE_CELL, format, member_number(j, name));
+    text_append(text, TEXT_TABLE_CELL, format, member_number(j, name));
     if (json_array_size(json_object_get(j, ci)) == 2)
-        text_append(text, NOISE_CELL, format_ci, member_end(j, ci, 0), member_end(j, ci, 1));
+        text_append(text, TEXT_TABLE_CELL, format_ci, member_end(j, ci, 0), member_end(j, ci, 1));
 }
 
-static void print_variance(char text[NOISE_CELL], const json_t *j)
+static void print_variance(char text[TEXT_TABLE_CELL], const json_t *j)
 {
     if (member_number(j, "variance") > 0 && json_is_null(json_object_get(j, "variance_ci")))
-        snprintf(text, NOISE_CELL, "%.2g", member_number(j, "variance"));
+        snprintf(text, TEXT_TABLE_CELL, "%.2g", member_number(j, "variance"));
     else
         print_estimate(text, j, "variance", "%.4g", " [%.4g, %.4g]");
 }
 
 /* "record: 1.002 [0.97, 1.03], margin 0.1; tile 48,16: ...", the tile where it differs. */
-static void print_against(char text[NOISE_CELL], const json_t *row)
+static void print_against(char text[TEXT_TABLE_CELL], const json_t *row)
 {
     const json_t *tile = json_object_get(row, "tile_claim"), *of[2] = {row, tile};
     if (member_text(row, "against") == NULL)
@@ -124,22 +109,22 @@ static void print_against(char text[NOISE_CELL], const json_t *row)
                    strcmp(member_text(tile, "ratio_verdict"), verdict_name(VERDICT_DIFFERENT)) == 0;
     for (int i = 0; i < 1 + differs; i++) {
         if (i == 0)
-            snprintf(text, NOISE_CELL, "%s: ", member_text(row, "against"));
+            snprintf(text, TEXT_TABLE_CELL, "%s: ", member_text(row, "against"));
         else
-            text_append(text, NOISE_CELL, "; tile %.0f,%.0f: ", member_number(tile, "x"),
+            text_append(text, TEXT_TABLE_CELL, "; tile %.0f,%.0f: ", member_number(tile, "x"),
                         member_number(tile, "y"));
         print_estimate(text, of[i], "ratio", "%.3g", " [%.3g, %.3g]");
-        text_append(text, NOISE_CELL, ", margin %.3g", member_number(of[i], "margin"));
+        text_append(text, TEXT_TABLE_CELL, ", margin %.3g", member_number(of[i], "margin"));
     }
 }
 
-void noise_results_cell(const json_t *row, int column, char text[NOISE_CELL])
+void noise_results_cell(const json_t *row, size_t column, char text[TEXT_TABLE_CELL])
 {
     const char *verdict = member_text(row, "verdict"), *error = member_text(row, "error");
     text[0] = '\0';
     switch (column) {
-    case 0: snprintf(text, NOISE_CELL, "%s", member_text(row, "scene")); break;
-    case 1: snprintf(text, NOISE_CELL, "%s", member_text(row, "engine")); break;
+    case 0: snprintf(text, TEXT_TABLE_CELL, "%s", member_text(row, "scene")); break;
+    case 1: snprintf(text, TEXT_TABLE_CELL, "%s", member_text(row, "engine")); break;
     case 2:
         if (json_object_get(row, "variance") != NULL)
             print_variance(text, row);
@@ -153,11 +138,12 @@ void noise_results_cell(const json_t *row, int column, char text[NOISE_CELL])
     case 6: print_estimate(text, row, "efficiency", "%.3g", " [%.3g, %.3g]"); break;
     default:
         if (member_text(row, "not_stored") != NULL)
-            snprintf(text, NOISE_CELL, "%s", member_text(row, "not_stored"));
+            snprintf(text, TEXT_TABLE_CELL, "%s", member_text(row, "not_stored"));
         else if (error != NULL)
-            snprintf(text, NOISE_CELL, "%s: %s", verdict != NULL ? verdict : "NOT JUDGED", error);
+            snprintf(text, TEXT_TABLE_CELL, "%s: %s", verdict != NULL ? verdict : "NOT JUDGED",
+                     error);
         else
-            snprintf(text, NOISE_CELL, "%s", verdict);
+            snprintf(text, TEXT_TABLE_CELL, "%s", verdict);
         break;
     }
 }
@@ -172,35 +158,26 @@ static void print_reasons(FILE *f, const json_t *noise)
     }
 }
 
+static const char *cell_of(const void *noise, size_t row, size_t column, bool markdown,
+                           char buffer[TEXT_TABLE_CELL])
+{
+    (void)markdown;
+    noise_results_cell(json_array_get(noise, row), column, buffer);
+    return buffer;
+}
+
 void noise_results_print(FILE *f, const json_t *noise, bool markdown)
 {
-    size_t width[NOISE_COLUMNS], rows = json_array_size(noise);
-    char text[NOISE_CELL];
-    if (rows == 0)
+    static const char *const headings[NOISE_COLUMNS] = {
+        "scene",        "engine", "variance of a sample", "of the noisiest tile",
+        "over that of", "slope",  "efficiency",           "verdict"};
+    struct text_column column[NOISE_COLUMNS];
+    const struct text_table t = {column, NOISE_COLUMNS, json_array_size(noise), cell_of, noise};
+    for (size_t c = 0; c < NOISE_COLUMNS; c++)
+        column[c] = (struct text_column){.heading = headings[c]};
+    if (t.num_rows == 0)
         return;
-    for (int c = 0; c < NOISE_COLUMNS; c++) {
-        width[c] = strlen(noise_results_headings[c]);
-        for (size_t i = 0; i < rows; i++) {
-            noise_results_cell(json_array_get(noise, i), c, text);
-            width[c] = strlen(text) > width[c] ? strlen(text) : width[c];
-        }
-    }
     fputc('\n', f);
-    for (size_t i = 0; i < rows + 1; i++) {
-        for (int c = 0; c < NOISE_COLUMNS; c++) {
-            if (i == 0)
-                snprintf(text, sizeof text, "%s", noise_results_headings[c]);
-            else
-                noise_results_cell(json_array_get(noise, i - 1), c, text);
-            if (markdown)
-                fprintf(f, "| %s ", text);
-            else
-                fprintf(f, "%-*s%s", c == NOISE_COLUMNS - 1 ? 0 : (int)width[c], text,
-                        c == NOISE_COLUMNS - 1 ? "" : "  ");
-        }
-        fputs(markdown ? "|\n" : "\n", f);
-        for (int c = 0; markdown && i == 0 && c < NOISE_COLUMNS; c++)
-            fputs(c == NOISE_COLUMNS - 1 ? "|---|\n" : "|---", f);
-    }
+    text_table_print(f, &t, markdown);
     print_reasons(f, noise);
 }

@@ -73,6 +73,17 @@ enum outcome results_claim_outcome(const json_t *claim)
                                                                         : OUTCOME_UNDECIDED;
 }
 
+enum outcome results_row_outcome(const json_t *row)
+{
+    enum verdict verdict;
+    const char *name = member_text(row, "verdict");
+    if (json_is_true(json_object_get(row, "passed")))
+        return OUTCOME_AS_EXPECTED;
+    if (name == NULL || !verdict_parse(name, &verdict))
+        return OUTCOME_NOT_JUDGED;
+    return verdict == VERDICT_DIFFERENT ? OUTCOME_OPPOSITE : OUTCOME_UNDECIDED;
+}
+
 size_t results_num_with_error(const json_t *claims, size_t i)
 {
     const json_t *error = json_object_get(json_array_get(claims, i), "error");
@@ -104,15 +115,12 @@ bool results_claim_lacks_time(const json_t *claim)
 
 bool results_next(struct results_walk *w)
 {
-    static const struct {
-        const char *key;
-        enum outcome (*outcome)(const json_t *judged);
-    } lists[NUM_JUDGED] = {[JUDGED_CLAIM] = {"claims", results_claim_outcome},
-                           [JUDGED_STATED_ERROR] = {"consistency", stated_error_outcome},
-                           [JUDGED_NOISE] = {"noise", noise_results_outcome},
-                           [JUDGED_CONVERGENCE] = {"convergence", convergence_results_outcome}};
+    static const char *const lists[NUM_JUDGED] = {[JUDGED_CLAIM] = "claims",
+                                                  [JUDGED_STATED_ERROR] = "consistency",
+                                                  [JUDGED_NOISE] = "noise",
+                                                  [JUDGED_CONVERGENCE] = "convergence"};
     while (w->kind < NUM_JUDGED) {
-        const json_t *row = json_array_get(json_object_get(w->results, lists[w->kind].key), w->row);
+        const json_t *row = json_array_get(json_object_get(w->results, lists[w->kind]), w->row);
         const json_t *engines = json_object_get(row, "engines");
         if (row == NULL) {
             w->kind++;
@@ -123,7 +131,8 @@ bool results_next(struct results_walk *w)
         } else {
             w->json = engines != NULL ? json_array_get(engines, w->engine++) : row;
             w->scene = member_text(row, "scene");
-            w->outcome = lists[w->kind].outcome(w->json);
+            w->outcome = w->kind == JUDGED_CLAIM ? results_claim_outcome(w->json)
+                                                 : results_row_outcome(w->json);
             w->lacks_time = w->kind == JUDGED_CLAIM && results_claim_lacks_time(w->json);
             w->index = w->row;
             w->row += engines == NULL;

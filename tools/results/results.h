@@ -27,6 +27,8 @@ NODISCARD bool results_read(const char *path, json_t **out, struct err *e);
  * other verdict that was not expected. */
 enum outcome { OUTCOME_NOT_JUDGED, OUTCOME_OPPOSITE, OUTCOME_UNDECIDED, OUTCOME_AS_EXPECTED };
 enum outcome results_claim_outcome(const json_t *claim);
+/* The same of a row that is no claim: stated errors, noise, an engine of the convergence. One that is only measured has passed. */
+enum outcome results_row_outcome(const json_t *row);
 /* How many claims have the error of claim i, which has one; 0 if an earlier one has it: it was said. */
 size_t results_num_with_error(const json_t *claims, size_t i);
 /* Is no earlier claim (or row of noise) of its scene? */

@@ -3,6 +3,7 @@
 #include "noise_results.h"
 #include "stated_error_results.h"
 
+#include "tools/base/text_table.h"
 #include "tools/compare/region.h"
 
 #include <math.h>
@@ -47,9 +48,6 @@ bool column_is_number(const struct column *c)
     return c->kind > COLUMN_PLOT;
 }
 
-/* A cell: borrowed from the claim, or a literal, or in `buffer`. */
-typedef char cell_buffer[96];
-
 /* What rounds to zero is printed as zero, never as -0.000. */
 static double percent(double fraction)
 {
@@ -58,7 +56,7 @@ static double percent(double fraction)
 }
 
 static const char *cell_text(const struct column *c, const json_t *claim, bool markdown,
-                             cell_buffer buffer)
+                             char buffer[TEXT_TABLE_CELL])
 {
     static const char *const mark[2][4] = {
         [false] = {"ERROR", "WRONG", "undecided", "ok"},
@@ -76,113 +74,45 @@ static const char *cell_text(const struct column *c, const json_t *claim, bool m
         return "-";
     double v = member_number(claim, c->key);
     if (c->kind == COLUMN_DIFFERENCE)
-        snprintf(buffer, sizeof(cell_buffer), "%+.3f [%+.3f, %+.3f]", percent(v),
+        snprintf(buffer, TEXT_TABLE_CELL, "%+.3f [%+.3f, %+.3f]", percent(v),
                  percent(member_end(claim, "ci", 0)), percent(member_end(claim, "ci", 1)));
     else if (c->kind == COLUMN_PERCENT && v >= region_mdb_none)
         return "none";
     else if (c->kind == COLUMN_PERCENT)
-        snprintf(buffer, sizeof(cell_buffer), "%.3f", percent(v));
+        snprintf(buffer, TEXT_TABLE_CELL, "%.3f", percent(v));
     else
-        snprintf(buffer, sizeof(cell_buffer), "%.3g", v);
+        snprintf(buffer, TEXT_TABLE_CELL, "%.3g", v);
     return buffer;
 }
 
-/* Columns that UTF-8 text fills, taking each code point as one column wide. */
-static size_t text_columns(const char *s)
+/* The claims, and those of the columns that are shown as text. */
+struct shown {
+    const json_t *claims;
+    const struct column *column[NUM_COLUMNS];
+};
+
+static const char *shown_cell(const void *of, size_t row, size_t column, bool markdown,
+                              char buffer[TEXT_TABLE_CELL])
 {
-    size_t n = 0;
-    for (; *s != '\0'; s++)
-        n += ((unsigned char)*s & 0xc0) != 0x80;
-    return n;
+    const struct shown *s = of;
+    return cell_text(s->column[column], json_array_get(s->claims, row), markdown, buffer);
 }
 
-static void print_padded(FILE *f, const char *s, size_t width, bool right)
+static void print_claims(FILE *f, const json_t *claims, bool markdown)
 {
-    int gap = (int)(width - text_columns(s));
-    fprintf(f, "%*s%s%*s", right ? gap : 0, "", s, right ? 0 : gap, "");
-}
-
-/* The line of a claim, or of headings (NULL). */
-static void print_line(FILE *f, const json_t *claim, const size_t width[NUM_COLUMNS])
-{
-    cell_buffer buffer;
-    for (size_t c = 0, left = 0; c < NUM_COLUMNS; c++) {
-        const struct column *column = &results_columns[c];
-        if (column->text == NULL)
-            continue;
-        const char *text = claim == NULL ? column->text : cell_text(column, claim, false, buffer);
-        fputs(left++ > 0 ? "  " : "", f);
-        if (column->kind == COLUMN_MARK)
-            fputs(text, f);
-        else
-            print_padded(f, text, width[c], column_is_number(column));
-    }
-    fputc('\n', f);
-}
-
-static void print_terminal(FILE *f, const json_t *claims)
-{
-    size_t width[NUM_COLUMNS] = {0};
+    struct shown s = {.claims = claims};
+    struct text_column heading[NUM_COLUMNS];
+    struct text_table t = {heading, 0, json_array_size(claims), shown_cell, &s};
     for (size_t c = 0; c < NUM_COLUMNS; c++) {
         const struct column *column = &results_columns[c];
+        bool is_number = column_is_number(column);
         if (column->text == NULL)
             continue;
-        width[c] = text_columns(column->text);
-        json_each(claim, claims) {
-            cell_buffer buffer;
-            size_t w = text_columns(cell_text(column, claim, false, buffer));
-            width[c] = w > width[c] ? w : width[c];
-        }
+        heading[t.num_columns] = (struct text_column){column->text, is_number,
+                                                      !is_number && column->kind != COLUMN_MARK};
+        s.column[t.num_columns++] = column;
     }
-    print_line(f, NULL, width);
-    json_each(claim, claims)
-        print_line(f, claim, width);
-}
-
-/* A backslash or a character reference for what would end the cell or start markup. */
-static void print_markdown_text(FILE *f, const char *s)
-{
-    for (; *s != '\0'; s++) {
-        if (*s == '\n' || *s == '\r')
-            fputc(' ', f);
-        else if (*s == '<')
-            fputs("&lt;", f);
-        else if (*s == '&')
-            fputs("&amp;", f);
-        else if (strchr("|\\`*_[]", *s) != NULL)
-            fprintf(f, "\\%c", *s);
-        else
-            fputc(*s, f);
-    }
-}
-
-static void print_markdown(FILE *f, const json_t *claims)
-{
-    const char *const rule = "|---|--:";
-    for (size_t c = 0; c < NUM_COLUMNS; c++)
-        if (results_columns[c].text != NULL)
-            fprintf(f, "| %s ", results_columns[c].text);
-    fputs("|\n", f);
-    for (size_t c = 0; c < NUM_COLUMNS; c++)
-        if (results_columns[c].text != NULL)
-            fprintf(f, "%.4s", column_is_number(&results_columns[c]) ? rule + 4 : rule);
-    fputs("|\n", f);
-    for (size_t r = 0; r < json_array_size(claims); r++) {
-        for (size_t c = 0; c < NUM_COLUMNS; c++) {
-            const struct column *column = &results_columns[c];
-            cell_buffer buffer;
-            if (column->text == NULL)
-                continue;
-            const char *text = cell_text(column, json_array_get(claims, r), true, buffer);
-            fputs("| ", f);
-            if (column->kind == COLUMN_MARK || column_is_number(column))
-                fputs(text, f);
-            else
-                print_markdown_text(f, text);
-            fputc(' ', f);
-        }
-        fputs("|\n", f);
-    }
+    text_table_print(f, &t, markdown);
 }
 
 static void print_errors(FILE *f, const json_t *claims, bool markdown)
@@ -203,11 +133,11 @@ static void print_errors(FILE *f, const json_t *claims, bool markdown)
             continue;
         }
         fputs("\n- ", f);
-        print_markdown_text(f, scene);
+        text_table_escape(f, scene);
         fputs(" against ", f);
-        print_markdown_text(f, b);
+        text_table_escape(f, b);
         fprintf(f, "%s: ", more);
-        print_markdown_text(f, error);
+        text_table_escape(f, error);
         fputc('\n', f);
     }
 }
@@ -215,10 +145,8 @@ static void print_errors(FILE *f, const json_t *claims, bool markdown)
 void results_table_print(FILE *f, const json_t *results, bool markdown)
 {
     const json_t *claims = json_object_get(results, "claims");
-    if (json_array_size(claims) > 0 && markdown)
-        print_markdown(f, claims);
-    else if (json_array_size(claims) > 0)
-        print_terminal(f, claims);
+    if (json_array_size(claims) > 0)
+        print_claims(f, claims, markdown);
     print_errors(f, claims, markdown);
     stated_error_print(f, json_object_get(results, "consistency"), markdown);
     noise_results_print(f, json_object_get(results, "noise"), markdown);

@@ -28,16 +28,6 @@ bool stated_error_check(const json_t *consistency, const char *path, struct err 
     return true;
 }
 
-enum outcome stated_error_outcome(const json_t *claim)
-{
-    enum verdict v;
-    if (member_text(claim, "verdict") == NULL || !verdict_parse(member_text(claim, "verdict"), &v))
-        return OUTCOME_NOT_JUDGED;
-    return v == VERDICT_EQUIVALENT  ? OUTCOME_AS_EXPECTED
-           : v == VERDICT_DIFFERENT ? OUTCOME_OPPOSITE
-                                    : OUTCOME_UNDECIDED;
-}
-
 /* The last columns: noise, and pixels that break the stop rule; empty where the scene does not ask. */
 static void print_more(FILE *f, const json_t *c, const char *before)
 {

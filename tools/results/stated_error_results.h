@@ -11,8 +11,6 @@
 /* Checks all that the functions below rely on; a failure is a line with file, scene and member. */
 NODISCARD bool stated_error_check(const json_t *consistency, const char *path, struct err *e);
 
-enum outcome stated_error_outcome(const json_t *claim);
-
 /* A line for each, for a terminal or as a Markdown table; nothing where there is none. */
 void stated_error_print(FILE *f, const json_t *consistency, bool markdown);
 

@@ -1,9 +1,11 @@
 #include "compare_job.h"
 #include "same_program.h"
 
+#include "tools/base/temp_dir.h"
 #include "tools/compare/hint.h"
 #include "tools/compare/variance_ratio.h"
 #include "tools/compare/verdict.h"
+#include "tools/report/report.h"
 #include "tools/results/claim_result.h"
 #include "tools/sequential/two_stage.h"
 #include "tools/results/results.h"
@@ -450,4 +452,17 @@ bool compare_job_write_json(const struct compare_job *job, const struct compared
     json_decref(claim);
     json_decref(root);
     return ok;
+}
+
+bool compare_job_write_report(const struct compare_job *job, const struct compared *c,
+                              const char *path, int argc, char **argv, struct err *e)
+{
+    struct err ignored = {0};
+    struct temp_dir dir;
+    if (!temp_dir_open(&dir, "compare", e))
+        return false;
+    const struct path results = fs_path("%s/results.json", dir.path);
+    bool ok = compare_job_write_json(job, c, results.s, argc, argv, e) &&
+              report_write(results.s, path, e);
+    return temp_dir_close(&dir, ok ? e : &ignored) && ok;
 }

@@ -56,5 +56,8 @@ bool compare_job_passes(const struct compare_job *job, const struct compared *c)
  * the command line. */
 NODISCARD bool compare_job_write_json(const struct compare_job *job, const struct compared *c,
                                       const char *path, int argc, char **argv, struct err *e);
+/* The page of that results.json, which goes with a directory of its own. */
+NODISCARD bool compare_job_write_report(const struct compare_job *job, const struct compared *c,
+                                        const char *path, int argc, char **argv, struct err *e);
 
 #endif

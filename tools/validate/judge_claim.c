@@ -405,12 +405,12 @@ bool claim_run_differs(const struct claim_run *t)
     if (t->result == NULL)
         return false;
     for (size_t i = 0; i < json_array_size(t->result); i++)
-        if (noise_results_outcome(json_array_get(t->result, i)) == OUTCOME_OPPOSITE)
+        if (results_row_outcome(json_array_get(t->result, i)) == OUTCOME_OPPOSITE)
             return true;
     if (t->of_noise)
         return false;
     if (t->a == NULL)
-        return stated_error_outcome(t->result) == OUTCOME_OPPOSITE;
+        return results_row_outcome(t->result) == OUTCOME_OPPOSITE;
     const char *verdict = member_text(t->result, "verdict");
     return verdict != NULL && strcmp(verdict, verdict_name(VERDICT_DIFFERENT)) == 0 &&
            results_claim_outcome(t->result) == OUTCOME_OPPOSITE;

@@ -126,12 +126,8 @@ TEST(csv_comes_back)
 TEST(text_is_escaped_and_numbers_are_printed)
 {
     OWN_TEXT text = NULL;
-    size_t size;
-    FILE *f = open_memstream(&text, &size);
-    assert_non_null(f);
-    html_print(f, "<b title=\"%s\">%s</b> %d %zu %+.2f%% %lld%s", "\"x'", "<i>&", -3, (size_t)7,
-               1.5, 1LL << 40, json_string_value(NULL));
-    fclose(f);
+    PRINTED(text, html_print(f, "<b title=\"%s\">%s</b> %d %zu %+.2f%% %lld%s", "\"x'", "<i>&", -3,
+                             (size_t)7, 1.5, 1LL << 40, json_string_value(NULL)));
     assert_string_equal(text,
                         "<b title=\"&quot;x&#39;\">&lt;i&gt;&amp;</b> -3 7 +1.50% 1099511627776");
 }

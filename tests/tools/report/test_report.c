@@ -214,11 +214,7 @@ TEST(numbers_and_text)
 
     char *text = NULL;
     size_t size;
-    FILE *f = open_memstream(&text, &size);
-    assert_non_null(f);
-    html_text(f, "<a href=\"x\">'&\x1b\n\xc3\xa4");
-    html_text(f, NULL);
-    fclose(f);
+    PRINTED(text, html_text(f, "<a href=\"x\">'&\x1b\n\xc3\xa4"), html_text(f, NULL));
     assert_string_equal(text, "&lt;a href=&quot;x&quot;&gt;&#39;&amp; \n\xc3\xa4");
     free(text);
 
@@ -226,9 +222,7 @@ TEST(numbers_and_text)
     static const char *const vector[][2] = {
         {"f", "Zg=="}, {"fo", "Zm8="}, {"foo", "Zm9v"}, {"foob", "Zm9vYg=="}};
     for (size_t i = 0; i < 4; i++) {
-        f = open_memstream(&text, &size);
-        html_base64(f, vector[i][0], strlen(vector[i][0]));
-        fclose(f);
+        PRINTED(text, html_base64(f, vector[i][0], strlen(vector[i][0])));
         assert_string_equal(text, vector[i][1]);
         free(text);
     }
@@ -237,9 +231,7 @@ TEST(numbers_and_text)
     assert_non_null(bytes);
     for (size_t i = 0; i < LONG; i++)
         bytes[i] = (uint8_t)(i * 37);
-    f = open_memstream(&text, &size);
-    html_base64(f, bytes, LONG);
-    fclose(f);
+    PRINTED(text, html_base64(f, bytes, LONG));
     uint8_t *back = decode_base64(text, &size);
     assert_int_equal(size, LONG);
     assert_memory_equal(back, bytes, LONG);

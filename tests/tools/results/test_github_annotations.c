@@ -25,12 +25,8 @@ static json_t *not_judged(const char *scene, const char *error)
 static char *printed(json_t *claims)
 {
     char *text = NULL;
-    size_t size;
-    FILE *f = open_memstream(&text, &size);
-    assert_non_null(f);
     json_auto_t *results = json_pack("{so}", "claims", claims);
-    github_annotations_print(f, results);
-    fclose(f);
+    PRINTED(text, github_annotations_print(f, results));
     return text;
 }
 

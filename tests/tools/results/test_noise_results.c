@@ -40,11 +40,11 @@ TEST(rows_come_out_as_they_say)
     static const enum outcome outcome[] = {OUTCOME_OPPOSITE, OUTCOME_AS_EXPECTED,
                                            OUTCOME_AS_EXPECTED, OUTCOME_NOT_JUDGED};
     struct err e;
-    char text[NOISE_CELL];
+    char text[TEXT_TABLE_CELL];
     json_auto_t *noise = load("", ""), *claims = noise_results_claims(noise);
     MUST(noise_results_check(noise, "x.json", &e));
     for (size_t i = 0; i < COUNT(outcome); i++)
-        assert_int_equal(noise_results_outcome(json_array_get(noise, i)), outcome[i]);
+        assert_int_equal(results_row_outcome(json_array_get(noise, i)), outcome[i]);
     noise_results_cell(json_array_get(noise, 0), 4, text);
     assert_string_equal(text,
                         "record: 1.5 [1.4, 1.6], margin 0.1; tile 0,32: 2 [1.7, 2.4], margin 0.3");

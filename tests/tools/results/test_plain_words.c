@@ -52,11 +52,8 @@ TEST(who_how_much_and_where)
 static char *printed(json_t *claims)
 {
     char *text = NULL;
-    size_t size;
-    FILE *f = open_memstream(&text, &size);
     json_auto_t *results = json_pack("{so}", "claims", claims);
-    plain_words_print(f, results, "page.html");
-    fclose(f);
+    PRINTED(text, plain_words_print(f, results, "page.html"));
     return text;
 }
 

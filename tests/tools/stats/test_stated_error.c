@@ -174,8 +174,8 @@ TEST(records_are_checked)
 TEST(records_are_shown)
 {
     json_auto_t *c = json_loads(record, 0, NULL);
-    assert_int_equal(stated_error_outcome(json_array_get(c, 0)), OUTCOME_AS_EXPECTED);
-    assert_int_equal(stated_error_outcome(json_array_get(c, 1)), OUTCOME_NOT_JUDGED);
+    assert_int_equal(results_row_outcome(json_array_get(c, 0)), OUTCOME_AS_EXPECTED);
+    assert_int_equal(results_row_outcome(json_array_get(c, 1)), OUTCOME_NOT_JUDGED);
     char *text;
     size_t size;
     FILE *f = open_memstream(&text, &size);
