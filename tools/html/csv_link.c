@@ -39,7 +39,7 @@ void csv_link_text(struct csv *c, const char *s)
     fputs("%22", c->f);
 }
 
-void csv_link_number(struct csv *c, double v)
+static void write_number(struct csv *c, double v)
 {
     separate(c);
     if (isfinite(v))
@@ -49,15 +49,15 @@ void csv_link_number(struct csv *c, double v)
 void csv_link_member(struct csv *c, const json_t *object, const char *name)
 {
     const json_t *v = json_object_get(object, name);
-    csv_link_number(c, json_is_number(v) ? json_number_value(v) : NAN);
+    write_number(c, json_is_number(v) ? json_number_value(v) : NAN);
 }
 
 void csv_link_interval(struct csv *c, const json_t *object, const char *name)
 {
     const json_t *ends = json_object_get(object, name);
     for (size_t n = 0; n < 2; n++)
-        csv_link_number(c, json_array_size(ends) == 2 ? json_number_value(json_array_get(ends, n))
-                                                      : NAN);
+        write_number(c,
+                     json_array_size(ends) == 2 ? json_number_value(json_array_get(ends, n)) : NAN);
 }
 
 void csv_link_line(struct csv *c)
@@ -74,7 +74,7 @@ void csv_link_row(struct csv *c, const char *letters, ...)
         if (*letters == 't') {
             csv_link_text(c, va_arg(values, const char *));
         } else if (*letters == 'n') {
-            csv_link_number(c, va_arg(values, double));
+            write_number(c, va_arg(values, double));
         } else {
             const json_t *object = va_arg(values, const json_t *);
             (*letters == 'm' ? csv_link_member : csv_link_interval)(c, object,

@@ -16,7 +16,6 @@ struct csv csv_link_open(FILE *f, const char *name, const char *header);
 /* Fields of a line in their order, then its end. Text is quoted; where a spreadsheet would take it for a
  * formula it gets an apostrophe before it. What is not finite is an empty field. */
 void csv_link_text(struct csv *c, const char *s);
-void csv_link_number(struct csv *c, double v);
 /* The number that is the member `name`, or an empty field. */
 void csv_link_member(struct csv *c, const json_t *object, const char *name);
 /* The two numbers of the member `name`, or two empty fields. */

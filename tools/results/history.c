@@ -121,20 +121,6 @@ static struct history_series *series_of(struct history *h, const json_t *claim, 
     return NULL;
 }
 
-/* Claims about means, then those about noise, which hang on the results as long as these are there. */
-static const json_t *list_of(const struct history *h, size_t run, int list)
-{
-    json_t *root = h->run[run].results;
-    if (list == 0)
-        return json_object_get(root, "claims");
-    if (json_object_get(root, "noise_claims") == NULL)
-        json_object_set_new(root, "noise_claims",
-                            noise_results_claims(json_object_get(root, "noise")));
-    return json_object_get(root, "noise_claims");
-}
-
-enum { LISTS = 2 };
-
 static double std_error(const struct history_point *p)
 {
     return (p->high - p->low) / 2 / gsl_cdf_ugaussian_Qinv(fmin(p->alpha, 0.4));
@@ -172,24 +158,32 @@ static int compare_series(const void *a, const void *b)
     return order != 0 ? order : strcmp(x->quantity, y->quantity);
 }
 
-static bool gather(struct history *h, struct err *e)
+static bool gather_list(struct history *h, size_t r, const json_t *claims, struct err *e)
 {
-    for (size_t n = 0; n < LISTS * h->num_runs; n++) {
-        size_t r = n / LISTS;
-        const json_t *claims = list_of(h, r, (int)(n % LISTS));
-        json_each(c, claims) {
-            if (results_claim_outcome(c) == OUTCOME_NOT_JUDGED || json_object_get(c, "ci") == NULL)
-                continue;
-            struct history_series *s = series_of(h, c, e);
-            if (s == NULL)
-                return false;
-            if (s->num > 0 && s->point[s->num - 1].run == r)
-                return err_set(e, "%s: %s: %s against %s is there twice", h->run[r].path, s->scene,
-                               s->a, s->b);
-            s->point[s->num++] = point_of(c, r);
-        }
+    json_each(c, claims) {
+        if (results_claim_outcome(c) == OUTCOME_NOT_JUDGED || json_object_get(c, "ci") == NULL)
+            continue;
+        struct history_series *s = series_of(h, c, e);
+        if (s == NULL)
+            return false;
+        if (s->num > 0 && s->point[s->num - 1].run == r)
+            return err_set(e, "%s: %s: %s against %s is there twice", h->run[r].path, s->scene,
+                           s->a, s->b);
+        s->point[s->num++] = point_of(c, r);
     }
     return true;
+}
+
+static bool gather(struct history *h, struct err *e)
+{
+    bool ok = true;
+    for (size_t r = 0; ok && r < h->num_runs; r++) {
+        json_t *root = h->run[r].results,
+               *noise = noise_results_claims(json_object_get(root, "noise"));
+        json_object_set_new(root, "noise_claims", noise); /* series borrow their texts */
+        ok = gather_list(h, r, json_object_get(root, "claims"), e) && gather_list(h, r, noise, e);
+    }
+    return ok;
 }
 
 bool history_read(const char *dir, double alpha, struct history *out, struct err *e)

@@ -135,9 +135,8 @@ static void assert_accepted(struct fixture *f, size_t count, const char *verdict
     assert_string_equal(json_string_value(json_object_get(change, "verdict")), verdict);
 }
 
-TEST_WITH(a_new_one_has_to_be_called_new, setup, teardown)
+TEST_OF(fixture, a_new_one_has_to_be_called_new, setup, teardown)
 {
-    struct fixture *f = *state;
     render(f, f->from, 1, 1);
     f->opt.why = "because";
     assert_refused(f, APPROVE_IMPOSSIBLE, "12_plane/cycles: nothing is stored");
@@ -152,9 +151,8 @@ TEST_WITH(a_new_one_has_to_be_called_new, setup, teardown)
 
 /* A kill before the image's last rename: the manifest is the new one, so nothing is left to approve, but the image is not yet
  * in its place. */
-TEST_WITH(an_interrupted_approval_is_ended, setup, teardown)
+TEST_OF(fixture, an_interrupted_approval_is_ended, setup, teardown)
 {
-    struct fixture *f = *state;
     const struct path exr = fs_path("%s/12_plane/cycles.exr", f->golden);
     char old[65], now[65];
     render(f, f->from, 1, 2);
@@ -169,9 +167,8 @@ TEST_WITH(an_interrupted_approval_is_ended, setup, teardown)
     assert_string_equal(now, "none");
 }
 
-TEST_WITH(other_seeds_are_accepted_with_their_effect, setup, teardown)
+TEST_OF(fixture, other_seeds_are_accepted_with_their_effect, setup, teardown)
 {
-    struct fixture *f = *state;
     render(f, f->golden, 1, 1);
     render(f, f->from, 1, 2);
     assert_accepted(f, 1, "EQUIVALENT");
@@ -189,9 +186,8 @@ TEST_WITH(other_seeds_are_accepted_with_their_effect, setup, teardown)
         json_string_value(json_object_get(json_object_get(change, "was"), "scene_sha256")), "abc");
 }
 
-TEST_WITH(a_difference_needs_a_reason, setup, teardown)
+TEST_OF(fixture, a_difference_needs_a_reason, setup, teardown)
 {
-    struct fixture *f = *state;
     render(f, f->golden, 1, 1);
     render(f, f->from, 1.1, 2);
     f->opt.accept_new = true;
@@ -223,9 +219,8 @@ static enum verdict compared(struct fixture *f)
 }
 
 /* Nothing is stored; the difference put there is found, and what is missing is said. */
-TEST_WITH(a_table_compares_without_storing, setup, teardown)
+TEST_OF(fixture, a_table_compares_without_storing, setup, teardown)
 {
-    struct fixture *f = *state;
     enum verdict verdict;
     struct err e;
     render(f, f->golden, 1, 1);
@@ -243,9 +238,8 @@ TEST_WITH(a_table_compares_without_storing, setup, teardown)
 }
 
 /* Equal means, but margins far below what the noise of the two can show. */
-TEST_WITH(an_inconclusive_one_is_refused_whatever_is_said, setup, teardown)
+TEST_OF(fixture, an_inconclusive_one_is_refused_whatever_is_said, setup, teardown)
 {
-    struct fixture *f = *state;
     render(f, f->golden, 1, 1);
     render(f, f->from, 1, 2);
     f->ref.margin_global = 0.001;
@@ -255,9 +249,8 @@ TEST_WITH(an_inconclusive_one_is_refused_whatever_is_said, setup, teardown)
     assert_refused(f, APPROVE_INCONCLUSIVE, "INCONCLUSIVE");
 }
 
-TEST_WITH(what_is_missing_or_damaged_is_refused, setup, teardown)
+TEST_OF(fixture, what_is_missing_or_damaged_is_refused, setup, teardown)
 {
-    struct fixture *f = *state;
     f->opt.accept_new = true;
     f->opt.why = "I want it";
     render(f, f->golden, 1, 1);
@@ -276,9 +269,8 @@ TEST_WITH(what_is_missing_or_damaged_is_refused, setup, teardown)
 }
 
 /* The stored one is of the scene as it was; only its size cannot be compared. */
-TEST_WITH(a_stale_one_is_what_is_compared_with, setup, teardown)
+TEST_OF(fixture, a_stale_one_is_what_is_compared_with, setup, teardown)
 {
-    struct fixture *f = *state;
     strcpy(f->scene.sha256, "old");
     render(f, f->golden, 1, 1);
     strcpy(f->scene.sha256, "abc");
@@ -293,9 +285,8 @@ TEST_WITH(a_stale_one_is_what_is_compared_with, setup, teardown)
     assert_accepted(f, 2, "NOT COMPARABLE");
 }
 
-TEST_WITH(states_have_names_and_orphans_are_found, setup, teardown)
+TEST_OF(fixture, states_have_names_and_orphans_are_found, setup, teardown)
 {
-    struct fixture *f = *state;
     struct suite suite = {.scene = &f->scene, .num_scenes = 1};
     json_t *names;
     struct err e;
@@ -364,14 +355,14 @@ static const struct suite_scene small_box = {.name = "41_cornell",
                                              .height = 8,
                                              .depth = 2};
 
-TEST_WITH(cycles_gives_the_same_bits_again, setup, teardown)
+TEST_OF(fixture, cycles_gives_the_same_bits_again, setup, teardown)
 {
-    render_twice(*state, "blender", small_box,
+    render_twice(f, "blender", small_box,
                  (struct suite_reference){.engine = "cycles", .replicates = 3, .spp = 4});
 }
 
-TEST_WITH(povray_gives_the_same_bits_again, setup, teardown)
+TEST_OF(fixture, povray_gives_the_same_bits_again, setup, teardown)
 {
-    render_twice(*state, "povray", small_box,
+    render_twice(f, "povray", small_box,
                  (struct suite_reference){.engine = "povray", .replicates = 2, .subgrid = 1});
 }

@@ -5,6 +5,7 @@
 #include "tools/plots/plot.h"
 #include "tools/plots/plot_power.h"
 #include "tests/support/own.h"
+#include "tests/support/simulate.h"
 #include "tests/support/test.h"
 
 /* The i-th smallest of n uniform numbers is at most x if at least i of them are: a binomial tail. */
@@ -29,18 +30,6 @@ TEST(qq_band_is_binomial)
     }
 }
 
-static double uniform(uint32_t *state)
-{
-    *state = *state * 1664525u + 1013904223u;
-    return ((*state >> 8) + 0.5) / 16777216.0;
-}
-
-static double normal(uint32_t *state)
-{
-    double r = sqrt(-2 * log(uniform(state)));
-    return r * cos(6.283185307179586 * uniform(state));
-}
-
 static json_t *claim_of(double alpha, double margin, double mdb)
 {
     json_t *c =
@@ -62,11 +51,13 @@ TEST(power_is_that_of_the_test)
     /* P(|N(0, 1)| > c) = 0.05 x 0.25 / 4 */
     assert_float_equal(erfc(p.critical / sqrt(2)), 0.003125, 1e-9);
     static const double bias[] = {0.003, 0.005, -0.006, 0.007, 0.008};
-    uint32_t seed = 11;
+    uint64_t seed = 11;
     for (size_t i = 0; i < sizeof bias / sizeof *bias; i++) {
         int found = 0;
         for (int k = 0; k < TRIALS; k++)
-            found += (fabs(bias[i] + p.error * normal(&seed)) - p.margin) / p.error > p.critical;
+            found += (fabs(bias[i] + p.error * draw_normal(uniform(&seed), &seed)) - p.margin) /
+                         p.error >
+                     p.critical;
         assert_float_equal((double)found / TRIALS, power_at(&p, bias[i]), 0.01);
         if (fabs(bias[i]) > 0.0055)
             assert_true(fabs((double)found / TRIALS - power_at(&p, bias[i] / 2)) > 0.01);
@@ -104,20 +95,10 @@ static char *saved(const char *link)
 TEST(csv_comes_back)
 {
     OWN_TEXT link = NULL;
-    size_t size;
-    FILE *f = open_memstream(&link, &size);
-    assert_non_null(f);
-    struct csv csv = csv_link_open(f, "x.csv", "name,a,b");
-    csv_link_text(&csv, "say \"hi\", <b>&#'\xc3\xa4");
-    csv_link_number(&csv, -0.25);
-    csv_link_number(&csv, NAN);
-    csv_link_line(&csv);
-    csv_link_text(&csv, "=1+1");
-    csv_link_number(&csv, 1e-9);
-    csv_link_number(&csv, 3);
-    csv_link_line(&csv);
-    csv_link_close(&csv);
-    fclose(f);
+    struct csv csv;
+    PRINTED(link, csv = csv_link_open(f, "x.csv", "name,a,b"),
+            csv_link_row(&csv, "tnn", "say \"hi\", <b>&#'\xc3\xa4", -0.25, NAN),
+            csv_link_row(&csv, "tnn", "=1+1", 1e-9, 3.0), csv_link_close(&csv));
     OWN_TEXT text = saved(link);
     assert_string_equal(
         text, "name,a,b\r\n\"say \"\"hi\"\", <b>&#'\xc3\xa4\",-0.25,\r\n\"'=1+1\",1e-09,3\r\n");
@@ -136,22 +117,16 @@ TEST(text_is_escaped_and_numbers_are_printed)
 TEST(axes_are_in_proportion)
 {
     OWN_TEXT text = NULL;
-    size_t size;
-    FILE *f = open_memstream(&text, &size);
-    assert_non_null(f);
-    struct plot p = {.f = f,
-                     .style = "plot",
+    struct plot p = {.style = "plot",
                      .left = 100,
                      .width = 300,
                      .height = 200,
                      .bottom = 40,
                      .x = {.label = "a <b>", .lo = 1, .hi = 1000, .is_log = true, .unit = " s"},
                      .y = {.label = "y", .lo = -1, .hi = 1}};
-    plot_open(&p, "what %s is", "\"it\"");
-    plot_point(&p, 0, 10, 0.5, "%s", "10 & half");
-    plot_point(&p, 0, 1e9, -7, "%s", "beyond both ends");
-    plot_close(&p);
-    fclose(f);
+    PRINTED(text, p.f = f, plot_open(&p, "what %s is", "\"it\""),
+            plot_point(&p, 0, 10, 0.5, "%s", "10 & half"),
+            plot_point(&p, 0, 1e9, -7, "%s", "beyond both ends"), plot_close(&p));
     assert_float_equal(plot_x(&p, 100), 300, 1e-9);
     assert_float_equal(plot_y(&p, 1), 0, 1e-9);
     static const char *const there[] = {
