@@ -55,7 +55,8 @@ $(BUILD)/cov/%: CXX := clang++
 $(BUILD)/cov/%: OPT := -O2 -g -fprofile-instr-generate -fcoverage-mapping
 $(BUILD)/cov/%: WERROR := 1
 # What no fuzzer runs is compiled in a fifth of the time; one that ran it after all would end (tests/fuzz/fuzz.c).
-UNFUZZED := $(addprefix renderer/,bvh shading transport pathtracer) $(addprefix reference/,truth cycles povray mitsuba pbrt) \
+UNFUZZED := $(addprefix renderer/,bvh shading transport pathtracer) reference/truth \
+  $(patsubst %/,%,$(sort $(dir $(wildcard reference/*/export_*.h)))) \
   $(addprefix tools/,stats compare sequential plots report validate converge commands)
 $(foreach d,$(UNFUZZED),$(eval $(BUILD)/clang/$(d)/%: OPT := -O0 -finstrument-functions))
 $(foreach b,san tsan cov,$(eval $(call tree,$(BUILD)/$(b),$(BUILD)/deps-test)))

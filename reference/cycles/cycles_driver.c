@@ -1,8 +1,7 @@
 /* Drives Blender: the dump, one Blender process for all replicates that are asked for, and the fold. */
-#include "cycles_driver.h"
-
 #include "blender.h"
 #include "export_cycles.h"
+#include "reference/replicates/engine_driver.h"
 #include "reference/replicates/independence.h"
 #include "reference/base/process.h"
 
@@ -164,8 +163,7 @@ static bool render(const struct reference_job *job, int first, int last, json_t 
     return true;
 }
 
-const struct engine_driver cycles_driver = {.program = "blender",
-                                            .scripts = scripts,
+const struct engine_driver cycles_driver = {.scripts = scripts,
                                             .prefix = "replicate",
                                             .count = count,
                                             .render = render,

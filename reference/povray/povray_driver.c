@@ -1,6 +1,4 @@
 /* Drives POV-Ray: the images of a povray_replicates, rendered side by side. */
-#include "povray_driver.h"
-
 #include "povray_replicates.h"
 #include "reference/base/process.h"
 
@@ -248,8 +246,7 @@ static bool write_key(const struct reference_job *job, const char *path, struct 
     return ok;
 }
 
-const struct engine_driver povray_driver = {.program = "povray",
-                                            .prefix = "picture",
+const struct engine_driver povray_driver = {.prefix = "picture",
                                             .below_zero = true,
                                             .count = count,
                                             .render = render,

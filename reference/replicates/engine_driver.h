@@ -37,7 +37,6 @@ uint32_t replicate_seed(uint32_t seed, int k);
 /* An engine. Rendering and folding share nothing but images and what was said, so that they can be done on different
  * machines. Each fails with one line if the engine cannot express the scene at all. */
 struct engine_driver {
-    const char *program;        /* looked up in PATH */
     const char *const *scripts; /* what it runs of share_dir, NULL at the end; or NULL */
     const char *prefix;         /* of an image's file, replicate_images_path() */
     bool below_zero;            /* images are differences */
@@ -55,6 +54,11 @@ struct engine_driver {
     /* A file that says all that decides the images, beside the program, the scripts and what the suite asks for. */
     bool (*write_key)(const struct reference_job *job, const char *path, struct err *e);
 };
+
+/* Of each engine with goldens, in reference/NAME/NAME_driver.c. */
+#define ENGINE_DRIVER(name, ...) extern const struct engine_driver name##_driver;
+ENGINES_WITH_GOLDENS(ENGINE_DRIVER)
+#undef ENGINE_DRIVER
 
 /* All of it here: count, render, fold. */
 NODISCARD bool engine_driver_render(const struct engine_driver *driver,

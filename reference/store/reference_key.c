@@ -19,6 +19,7 @@ enum { RECIPE = 1, MOST_SCRIPTS = 8 };
 static bool hash_parts(const struct engine_driver *driver, const struct reference_job *job,
                        const char *path, char hex[3][65], struct err *e)
 {
+    const char *name = engine_kind_of(job->ref->engine)->program;
     char program[4096], all[64 * MOST_SCRIPTS + 1];
     strcpy(hex[1], "none");
     for (int i = 0; driver->scripts != NULL && driver->scripts[i] != NULL; i++) {
@@ -28,8 +29,8 @@ static bool hash_parts(const struct engine_driver *driver, const struct referenc
             return false;
         sha256_text(all, hex[1]);
     }
-    if (!process_find(driver->program, program, sizeof program))
-        return err_set(e, "%s: no such program in PATH", driver->program);
+    if (!process_find(name, program, sizeof program))
+        return err_set(e, "%s: no such program in PATH", name);
     return sha256_file(program, hex[0], e) && driver->write_key(job, path, e) &&
            sha256_file(path, hex[2], e);
 }

@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#define KIND(name, title, ending, subgrid) {#name, title, ending, subgrid},
+#define KIND(name, ...) {#name, __VA_ARGS__},
 
 const struct engine_kind engine_table[] = {ENGINES(KIND){0}};
 const char *const engine_names[] = {ENGINES_WITH_GOLDENS(ENGINE_WORD) NULL};

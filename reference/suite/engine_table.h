@@ -6,26 +6,28 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/* ROW(name, title, ending, subgrid), see struct engine_kind. First those that goldens are made with; the first of them is the
- * one that costs and convergence are compared with. */
+/* ROW(name, title, ending, program, subgrid), see struct engine_kind. First those that goldens are made with; the first of them
+ * is the one that costs and convergence are compared with. */
 #define ENGINES_WITH_GOLDENS(ROW)                                                                  \
-    ROW(cycles, "Cycles", ".json", false)                                                          \
-    ROW(povray, "POV-Ray", ".pov", true)
+    ROW(cycles, "Cycles", ".json", "blender", false)                                               \
+    ROW(povray, "POV-Ray", ".pov", "povray", true)
 #define ENGINES(ROW)                                                                               \
     ENGINES_WITH_GOLDENS(ROW)                                                                      \
-    ROW(mitsuba, "Mitsuba", ".xml", false)                                                         \
-    ROW(pbrt, "pbrt", ".pbrt", false)
+    ROW(mitsuba, "Mitsuba", ".xml", "mitsuba", false)                                              \
+    ROW(pbrt, "pbrt", ".pbrt", "pbrt", false)
 
 /* Rows for lists of words, {"auto", ENGINES(ENGINE_WORD) NULL}, and for sentences, "one of" ENGINES(ENGINE_TEXT). */
-#define ENGINE_WORD(name, title, ending, subgrid) #name,
-#define ENGINE_TEXT(name, title, ending, subgrid) " " #name
-#define ENGINE_ID(name, title, ending, subgrid)   ENGINE_##name,
+#define ENGINE_WORD(name, ...)                                #name,
+#define ENGINE_TEXT(name, ...)                                " " #name
+#define ENGINE_ID(name, ...)                                  ENGINE_##name,
+#define ENGINE_PROGRAM(name, title, ending, program, subgrid) program,
 enum { ENGINES_WITH_GOLDENS(ENGINE_ID) NUM_ENGINES_WITH_GOLDENS };
 
 struct engine_kind {
-    const char *name;   /* in files, results and on command lines */
-    const char *title;  /* for people */
-    const char *ending; /* of its scene files */
+    const char *name;    /* in files, results and on command lines */
+    const char *title;   /* for people */
+    const char *ending;  /* of its scene files */
+    const char *program; /* looked up in PATH */
     bool subgrid; /* the suite says k, for k x k samples a pixel of one replicate, not "spp" */
 };
 

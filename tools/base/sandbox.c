@@ -5,6 +5,7 @@
 #include "memory_group.h"
 
 #include "reference/base/process.h"
+#include "reference/suite/engine_table.h"
 #include "renderer/base/fs.h"
 
 #include <assert.h>
@@ -186,8 +187,7 @@ static bool hide(struct sandbox *s, const char *path, struct err *e)
 static bool hide_renderers(struct sandbox *s, struct err *e)
 {
     static const char *const dirs[] = {"/usr/bin", "/usr/local/bin", "/usr/games"};
-    static const char *const names[] = {"assay",  "pathtracer", "blender",
-                                        "povray", "mitsuba",    "pbrt"};
+    static const char *const names[] = {"assay", "pathtracer", ENGINES(ENGINE_PROGRAM)};
     bool ok = hide(s, "/proc/self/exe", e);
     for (size_t i = 0; i < sizeof dirs / sizeof *dirs; i++)
         for (size_t k = 0; ok && k < sizeof names / sizeof *names; k++)

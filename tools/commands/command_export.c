@@ -23,7 +23,7 @@ struct settings {
 };
 
 /* " .json (cycles)" */
-#define ENGINE_ENDING(name, title, ending, subgrid) " " ending " (" #name ")"
+#define ENGINE_ENDING(name, title, ending, ...) " " ending " (" #name ")"
 
 static bool read_engine(void *settings, const char *const v[4], struct err *e)
 {

@@ -43,12 +43,13 @@ static bool engine_inputs(struct plan *p, const char *engine, const char *share_
                           const char **sha256, struct err *e)
 {
     const struct engine_driver *driver = engine_driver_of(engine);
+    const char *program = engine_kind_of(engine)->program;
     bool ok = true;
     char path[PLAN_PATH + 64];
     for (int i = 0; ok && driver->scripts != NULL && driver->scripts[i] != NULL; i++)
         ok = plan_input(p, fs_path("%s/%s", share_dir, driver->scripts[i]).s, e);
-    if (ok && !process_find(driver->program, path, sizeof path))
-        return err_set(e, "%s: no such program in PATH", driver->program);
+    if (ok && !process_find(program, path, sizeof path))
+        return err_set(e, "%s: no such program in PATH", program);
     ok = ok && plan_input(p, path, e);
     if (ok && sha256 != NULL)
         *sha256 = json_string_value(json_object_get(json_object_get(p->head, "inputs"), path));
@@ -60,8 +61,7 @@ bool job_reference_live_inputs(struct plan *p, const char *share_dir, struct err
     char path[PLAN_PATH + 64];
     bool ok = plan_input(p, fs_path("%s/import_check/blender_import.py", share_dir).s, e);
     for (int i = 0; ok && i < NUM_ENGINES_WITH_GOLDENS; i++)
-        if (i == ENGINE_cycles ||
-            process_find(engine_driver_of(engine_names[i])->program, path, sizeof path))
+        if (i == ENGINE_cycles || process_find(engine_table[i].program, path, sizeof path))
             ok = engine_inputs(p, engine_names[i], share_dir, NULL, e);
     return ok;
 }

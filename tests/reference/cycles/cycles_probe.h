@@ -6,7 +6,7 @@
 #include "tests/support/build_scene.h"
 #include "tests/support/sky.h"
 
-#include "reference/cycles/cycles_driver.h"
+#include "reference/replicates/engine_driver.h"
 
 /* A job for an empty scene, with directories for its work and for stand-ins of Blender. */
 struct probe {

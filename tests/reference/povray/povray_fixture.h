@@ -3,7 +3,7 @@
 #define ASSAY_POVRAY_FIXTURE_H
 
 #include "reference/povray/export_povray.h"
-#include "reference/povray/povray_driver.h"
+#include "reference/replicates/engine_driver.h"
 
 /* POV-Ray sleeps through most of the 0.7 s that a small image takes. */
 enum { THREADS = 8 };

@@ -1,7 +1,7 @@
 #include "bench_engines.h"
 #include "bench_povray.h"
 
-#include "reference/cycles/cycles_driver.h"
+#include "reference/replicates/engine_driver.h"
 #include "renderer/base/fs.h"
 #include "renderer/transport/render.h"
 
