@@ -38,7 +38,7 @@ static json_t *camera_json(const struct scene *s, const struct camera *c, struct
         return NULL;
     }
     double nearest, furthest;
-    features_distances(s, c->eye, &nearest, &furthest);
+    features_distances(s, c, &nearest, &furthest);
     nearest -= (double)c->lens_radius; /* where a ray may start */
     furthest += (double)c->lens_radius;
     /* Cycles clips by depth, we by distance: take planes that clip nothing in either, or the same. */
@@ -71,7 +71,7 @@ bool export_cycles(const struct scene *s, const struct camera *c, int depth, con
                    struct err *e)
 {
     assert(depth >= 0 && c->width > 0 && c->height > 0);
-    double extent = d3_length(d3_sub(cycles_wide(s->bounds_max), cycles_wide(s->bounds_min)));
+    double extent = d3_length(d3_sub(d3_of(s->bounds_max), d3_of(s->bounds_min)));
     json_t *camera = NULL, *materials = NULL, *meshes = NULL, *environment = NULL;
     bool image_written = false;
     uint32_t textures_written = 0;

@@ -3,21 +3,9 @@
 #define ASSAY_EXPORT_CYCLES_INTERNAL_H
 
 #include "renderer/base/err.h"
-#include "renderer/math/mat4.h"
 #include "renderer/scene/scene.h"
 
 #include <jansson.h>
-
-static inline dvec3 cycles_wide(vec3 v)
-{
-    return d3(v.x, v.y, v.z);
-}
-/* Twice the triangle's area along its geometric normal. */
-static inline dvec3 cycles_area_normal(const vec3 *p)
-{
-    return d3_cross(d3_sub(cycles_wide(p[1]), cycles_wide(p[0])),
-                    d3_sub(cycles_wide(p[2]), cycles_wide(p[0])));
-}
 
 json_t *cycles_vec3(vec3 v);
 json_t *cycles_rgb(rgb c);

@@ -109,15 +109,13 @@ static void push(json_t *array, const float *v, int num, float sign)
  * renderer turns them), 0 mixed. *flat: they are the geometric normal, of either sign. */
 static int normals_side(const vec3 *p, const vec3 *n, bool *flat)
 {
-    dvec3 ng = cycles_area_normal(p);
-    ng = d3_scale(ng, 1 / d3_length(ng));
+    dvec3 ng = features_normal(p);
     int positive = 0;
     double worst = 0;
     for (int k = 0; k < 3; k++) {
-        double cosine = d3_dot(cycles_wide(n[k]), ng);
+        double cosine = d3_dot(d3_of(n[k]), ng);
         positive += cosine > 0;
-        worst =
-            fmax(worst, d3_length(d3_sub(cycles_wide(n[k]), d3_scale(ng, cosine > 0 ? 1 : -1))));
+        worst = fmax(worst, d3_length(d3_sub(d3_of(n[k]), d3_scale(ng, cosine > 0 ? 1 : -1))));
     }
     *flat = worst < FLAT && positive % 3 == 0;
     return positive == 3 ? 1 : positive == 0 ? -1 : 0;
@@ -177,7 +175,7 @@ json_t *cycles_spheres(const struct scene *s, vec3 eye)
         /* Analytic spheres are invisible from inside and no lights; an opaque sphere is seen from
          * inside only by an eye that is there. */
         bool opaque = m->kind != MATERIAL_REFRACTION && m->kind != MATERIAL_GLASS;
-        bool inside = d3_length(d3_sub(cycles_wide(eye), cycles_wide(sp->centre))) < sp->radius;
+        bool inside = d3_length(d3_sub(d3_of(eye), d3_of(sp->centre))) < sp->radius;
         bool dark = rgb_is_zero(m->radiance);
         json_array_append_new(out, json_pack("{so,si,so,sf,si,sb}", "name",
                                              cycles_name(s->objects[s->sphere_object[i]].name),

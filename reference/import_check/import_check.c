@@ -16,9 +16,9 @@
 #define ANGLE_TOLERANCE 1e-5 /* relative, of tan_h */
 
 static bool read_vector(const struct import_pair *pair, const json_t *object, const char *key,
-                        point *out, struct err *e)
+                        dvec3 *out, struct err *e)
 {
-    point p = {0};
+    dvec3 p = {0};
     if (!import_geometry_read_point(json_object_get(object, key), 0, &p))
         return err_set(e, "blender_import.py: '%s' is not three numbers", key);
     *out = import_geometry_point(pair, p);
@@ -40,11 +40,11 @@ static bool compare_camera(struct import_pair *pair, const struct camera *c, con
     static const char *const names[] = {"right", "up", "backward"};
     const vec3 ours[] = {c->right, c->up, c->backward};
     struct import_report *out = pair->out;
-    point p = {0};
+    dvec3 p = {0};
     for (int i = 0; i < 3; i++) {
         if (!read_vector(pair, camera, names[i], &p, e))
             return false;
-        double angle = point_angle(point_of(ours[i]), p);
+        double angle = import_geometry_angle(d3_of(ours[i]), p);
         out->axis_error = fmax(out->axis_error, angle);
         if (!(angle <= AXIS_TOLERANCE))
             import_geometry_differ(pair, "camera: '%s' is %.3g rad from Blender's", names[i],
@@ -52,7 +52,7 @@ static bool compare_camera(struct import_pair *pair, const struct camera *c, con
     }
     if (!read_vector(pair, camera, "eye", &p, e))
         return false;
-    double d = point_length(point_sub(p, point_of(c->eye))) / pair->extent;
+    double d = d3_length(d3_sub(p, d3_of(c->eye))) / pair->extent;
     out->place_error = fmax(out->place_error, d);
     if (!(d <= IMPORT_PLACE_TOLERANCE))
         import_geometry_differ(pair, "camera: %.3g of the scene's extent from Blender's", d);
@@ -68,38 +68,38 @@ static bool compare_camera(struct import_pair *pair, const struct camera *c, con
 }
 
 static bool same_light(const struct import_pair *pair, const struct light *l, const char *kind,
-                       point position, point direction)
+                       dvec3 position, dvec3 direction)
 {
     const char *wanted = l->kind == LIGHT_POINT ? "POINT" : l->kind == LIGHT_SPOT ? "SPOT" : "SUN";
     bool placed = l->kind != LIGHT_DIRECTIONAL, aimed = l->kind != LIGHT_POINT;
-    point aim = point_of(l->kind == LIGHT_SPOT ? l->axis : neg(l->to_light));
+    dvec3 aim = d3_of(l->kind == LIGHT_SPOT ? l->axis : neg(l->to_light));
     return strcmp(kind, wanted) == 0 &&
-           (!placed || point_length(point_sub(position, point_of(l->position))) <=
+           (!placed || d3_length(d3_sub(position, d3_of(l->position))) <=
                            IMPORT_PLACE_TOLERANCE * pair->extent) &&
-           (!aimed || point_angle(direction, aim) <= AXIS_TOLERANCE);
+           (!aimed || import_geometry_angle(direction, aim) <= AXIS_TOLERANCE);
 }
 
 /* Two triangles that emit to one side and have their centre at a light of Blender's: a rectangle of light.
  * The triangles share its diagonal, their longest edge, whose middle is the centre. */
-static bool is_rectangle_at(const struct import_pair *pair, const struct object *o, point place)
+static bool is_rectangle_at(const struct import_pair *pair, const struct object *o, dvec3 place)
 {
     const struct scene *s = pair->s;
     const struct material *m = &s->materials[o->material];
     if (o->num_triangles != 2 || rgb_is_zero(m->radiance) || m->radiance_both_sides)
         return false;
     const vec3 *p = s->position + 3 * (size_t)o->first_triangle;
-    point centre = {0};
+    dvec3 centre = {0};
     double longest = -1;
     for (int i = 0; i < 3; i++) {
-        point a = point_of(p[i]), b = point_of(p[(i + 1) % 3]);
-        double d = point_length(point_sub(b, a));
+        dvec3 a = d3_of(p[i]), b = d3_of(p[(i + 1) % 3]);
+        double d = d3_length(d3_sub(b, a));
         if (d > longest) {
             longest = d;
-            centre = point_add(a, b);
+            centre = d3_add(a, b);
         }
     }
-    centre = (point){centre.x / 2, centre.y / 2, centre.z / 2};
-    return point_length(point_sub(centre, place)) <= IMPORT_PLACE_TOLERANCE * pair->extent;
+    centre = (dvec3){centre.x / 2, centre.y / 2, centre.z / 2};
+    return d3_length(d3_sub(centre, place)) <= IMPORT_PLACE_TOLERANCE * pair->extent;
 }
 
 /* Each light of Blender's has to be one of ours, and each of ours one of Blender's. `found` grows by the
@@ -116,7 +116,7 @@ static bool compare_lights(struct import_pair *pair, const json_t *lights, json_
         const json_t *light = json_array_get(lights, i);
         const char *kind = json_string_value(json_object_get(light, "kind"));
         const char *name = json_string_value(json_object_get(light, "name"));
-        point position = {0}, direction = {0};
+        dvec3 position = {0}, direction = {0};
         ok = (kind != NULL && name != NULL) ||
              err_set(e, "blender_import.py: a light without its members");
         ok = ok && read_vector(pair, light, "position", &position, e) &&
@@ -180,11 +180,11 @@ bool import_check_compare(const struct scene *s, const struct camera *c, const j
     if (axis == NULL || strchr("XYZ", axis[0]) == NULL || strcmp(axis + 1, "_UP") != 0 ||
         !json_is_array(meshes) || !json_is_array(cameras) || !json_is_array(lights))
         return err_set(e, "blender_import.py: not a dump of a file");
-    struct import_pair pair = {
-        .s = s,
-        .out = out,
-        .axis = axis[0],
-        .extent = point_length(point_sub(point_of(s->bounds_max), point_of(s->bounds_min)))};
+    struct import_pair pair = {.s = s,
+                               .out = out,
+                               .axis = axis[0],
+                               .extent =
+                                   d3_length(d3_sub(d3_of(s->bounds_max), d3_of(s->bounds_min)))};
     bool *found = calloc((size_t)s->num_triangles + 2, sizeof *found);
     if (found == NULL)
         return err_set(e, "import check: out of memory");

@@ -26,7 +26,7 @@ struct check {
     struct import_pair *pair;
     double tolerance;
     uint32_t *corner_vertex; /* per corner of ours */
-    point *vertex;
+    dvec3 *vertex;
     uint32_t num_vertices;
     uint32_t *bucket, *next; /* hash grid over vertices */
     uint32_t num_buckets;
@@ -39,12 +39,12 @@ struct check {
  *   Y_UP         (x,-z,y)   (x,y,z)
  *   Z_UP         (x,y,z)    (-x,z,y)
  *   X_UP         (-z,y,x)   (y,x,-z) */
-point import_geometry_point(const struct import_pair *pair, point b)
+dvec3 import_geometry_point(const struct import_pair *pair, dvec3 b)
 {
     switch (pair->axis) {
-    case 'Z': return (point){-b.x, b.z, b.y};
-    case 'X': return (point){b.y, b.z, b.x};
-    default: return (point){b.x, b.z, -b.y};
+    case 'Z': return (dvec3){-b.x, b.z, b.y};
+    case 'X': return (dvec3){b.y, b.z, b.x};
+    default: return (dvec3){b.x, b.z, -b.y};
     }
 }
 
@@ -56,7 +56,7 @@ static uint32_t bucket_of(const struct check *c, int64_t i, int64_t j, int64_t k
 }
 
 /* The nearest vertex within the tolerance, or none. Cells are two tolerances wide. */
-static uint32_t find_vertex(const struct check *c, point p)
+static uint32_t find_vertex(const struct check *c, dvec3 p)
 {
     double cell = 2 * c->tolerance, best = c->tolerance;
     int64_t i0 = (int64_t)floor(p.x / cell), j0 = (int64_t)floor(p.y / cell),
@@ -65,7 +65,7 @@ static uint32_t find_vertex(const struct check *c, point p)
     for (int64_t n = 0; n < 27; n++) {
         uint32_t b = bucket_of(c, i0 + n % 3 - 1, j0 + n / 3 % 3 - 1, k0 + n / 9 - 1);
         for (uint32_t v = c->bucket[b]; v != none; v = c->next[v]) {
-            double d = point_length(point_sub(c->vertex[v], p));
+            double d = d3_length(d3_sub(c->vertex[v], p));
             if (d <= best) {
                 best = d;
                 nearest = v;
@@ -75,7 +75,7 @@ static uint32_t find_vertex(const struct check *c, point p)
     return nearest;
 }
 
-static uint32_t add_vertex(struct check *c, point p)
+static uint32_t add_vertex(struct check *c, dvec3 p)
 {
     uint32_t v = find_vertex(c, p);
     if (v != none)
@@ -107,7 +107,7 @@ static bool weld(struct check *c, struct err *e)
     for (uint32_t b = 0; b < c->num_buckets; b++)
         c->bucket[b] = none;
     for (uint32_t k = 0; k < 3 * c->pair->s->num_triangles; k++) {
-        uint32_t v = c->corner_vertex[k] = add_vertex(c, point_of(c->pair->s->position[k]));
+        uint32_t v = c->corner_vertex[k] = add_vertex(c, d3_of(c->pair->s->position[k]));
         c->next_use[k] = c->first_use[v];
         c->first_use[v] = k;
     }
@@ -118,15 +118,15 @@ static bool weld(struct check *c, struct err *e)
 struct polygon {
     const char *object;
     size_t n, index;
-    point *corners, *normals; /* normals: NULL where Blender made its own */
+    dvec3 *corners, *normals; /* normals: NULL where Blender made its own */
     double normal_tolerance;
     uint32_t *vertex;
 };
 
-static void check_normal(struct check *c, uint32_t corner, point theirs, double tolerance)
+static void check_normal(struct check *c, uint32_t corner, dvec3 theirs, double tolerance)
 {
-    point ours = point_of(c->pair->s->normal[corner]);
-    double angle = point_angle(ours, theirs);
+    dvec3 ours = d3_of(c->pair->s->normal[corner]);
+    double angle = import_geometry_angle(ours, theirs);
     c->pair->out->normal_error = fmax(c->pair->out->normal_error, angle);
     c->pair->out->normals++;
     if (!(angle <= tolerance))
@@ -144,19 +144,19 @@ static size_t corner_of(const struct polygon *p, uint32_t vertex)
     return p->n;
 }
 
-static point vector_area(const struct check *c, uint32_t triangle)
+static dvec3 vector_area(const struct check *c, uint32_t triangle)
 {
-    point a = c->vertex[c->corner_vertex[3 * triangle]],
+    dvec3 a = c->vertex[c->corner_vertex[3 * triangle]],
           b = c->vertex[c->corner_vertex[3 * triangle + 1]],
           d = c->vertex[c->corner_vertex[3 * triangle + 2]];
-    point n = point_cross(point_sub(b, a), point_sub(d, a));
-    return (point){n.x / 2, n.y / 2, n.z / 2};
+    dvec3 n = d3_cross(d3_sub(b, a), d3_sub(d, a));
+    return (dvec3){n.x / 2, n.y / 2, n.z / 2};
 }
 
 /* Triangle of ours, not found before, inside the polygon and to the same side. */
-static bool belongs(const struct check *c, const struct polygon *p, uint32_t t, point area)
+static bool belongs(const struct check *c, const struct polygon *p, uint32_t t, dvec3 area)
 {
-    return !c->found[t] && point_dot(vector_area(c, t), area) > 0 &&
+    return !c->found[t] && d3_dot(vector_area(c, t), area) > 0 &&
            corner_of(p, c->corner_vertex[3 * t]) < p->n &&
            corner_of(p, c->corner_vertex[3 * t + 1]) < p->n &&
            corner_of(p, c->corner_vertex[3 * t + 2]) < p->n;
@@ -165,13 +165,13 @@ static bool belongs(const struct check *c, const struct polygon *p, uint32_t t, 
 /* Takes our triangles that make up the polygon. For three corners that is one. */
 static void match_polygon(struct check *c, const struct polygon *p)
 {
-    point area = {0}, covered = {0};
+    dvec3 area = {0}, covered = {0};
     double around = 0;
     for (size_t i = 0; i < p->n; i++) {
-        point a = p->corners[i], b = p->corners[(i + 1) % p->n];
-        point n = point_cross(point_sub(a, p->corners[0]), point_sub(b, p->corners[0]));
-        area = point_add(area, (point){n.x / 2, n.y / 2, n.z / 2});
-        around += point_length(point_sub(b, a));
+        dvec3 a = p->corners[i], b = p->corners[(i + 1) % p->n];
+        dvec3 n = d3_cross(d3_sub(a, p->corners[0]), d3_sub(b, p->corners[0]));
+        area = d3_add(area, (dvec3){n.x / 2, n.y / 2, n.z / 2});
+        around += d3_length(d3_sub(b, a));
         p->vertex[i] = find_vertex(c, a);
         if (p->vertex[i] == none) {
             import_geometry_differ(
@@ -182,19 +182,19 @@ static void match_polygon(struct check *c, const struct polygon *p)
         }
         c->pair->out->place_error =
             fmax(c->pair->out->place_error,
-                 point_length(point_sub(c->vertex[p->vertex[i]], a)) / c->pair->extent);
+                 d3_length(d3_sub(c->vertex[p->vertex[i]], a)) / c->pair->extent);
     }
     double tolerance = c->tolerance * around;
     size_t taken = 0;
     for (size_t i = 0; i < p->n; i++) {
-        if (taken > 0 && point_length(point_sub(area, covered)) <= tolerance)
+        if (taken > 0 && d3_length(d3_sub(area, covered)) <= tolerance)
             break;
         for (uint32_t k = c->first_use[p->vertex[i]]; k != none; k = c->next_use[k]) {
             uint32_t t = k / 3;
             if (!belongs(c, p, t, area))
                 continue;
-            point with = point_add(covered, vector_area(c, t));
-            if (point_length(point_sub(area, with)) > point_length(point_sub(area, covered)))
+            dvec3 with = d3_add(covered, vector_area(c, t));
+            if (d3_length(d3_sub(area, with)) > d3_length(d3_sub(area, covered)))
                 continue;
             covered = with;
             c->found[t] = true;
@@ -209,13 +209,13 @@ static void match_polygon(struct check *c, const struct polygon *p)
     }
     c->pair->out->triangles += taken;
     c->pair->out->polygons++;
-    if (!(point_length(point_sub(area, covered)) <= tolerance))
+    if (!(d3_length(d3_sub(area, covered)) <= tolerance))
         import_geometry_differ(
             c->pair, "%s, polygon %zu: our triangles do not make it up, by %.3g of its area",
-            p->object, p->index, point_length(point_sub(area, covered)) / point_length(area));
+            p->object, p->index, d3_length(d3_sub(area, covered)) / d3_length(area));
 }
 
-bool import_geometry_read_point(const json_t *array, size_t at, point *out)
+bool import_geometry_read_point(const json_t *array, size_t at, dvec3 *out)
 {
     const json_t *v[3];
     for (size_t i = 0; i < 3; i++) {
@@ -223,12 +223,12 @@ bool import_geometry_read_point(const json_t *array, size_t at, point *out)
         if (!json_is_number(v[i]))
             return false;
     }
-    *out = (point){json_number_value(v[0]), json_number_value(v[1]), json_number_value(v[2])};
+    *out = (dvec3){json_number_value(v[0]), json_number_value(v[1]), json_number_value(v[2])};
     return true;
 }
 
 /* In our axes. */
-static bool read_turned(const struct check *c, const json_t *array, size_t at, point *out)
+static bool read_turned(const struct check *c, const json_t *array, size_t at, dvec3 *out)
 {
     if (!import_geometry_read_point(array, at, out))
         return false;
@@ -245,8 +245,8 @@ static bool check_mesh(struct check *c, const json_t *mesh, struct err *e)
     const char *name = json_string_value(json_object_get(mesh, "name"));
     if (name == NULL || !json_is_array(sizes) || !json_is_array(corners))
         return err_set(e, "blender_import.py: a mesh without its members");
-    point *places = malloc(LARGEST_POLYGON * sizeof *places);
-    point *directions = malloc(LARGEST_POLYGON * sizeof *directions);
+    dvec3 *places = malloc(LARGEST_POLYGON * sizeof *places);
+    dvec3 *directions = malloc(LARGEST_POLYGON * sizeof *directions);
     uint32_t *vertex = malloc(LARGEST_POLYGON * sizeof *vertex);
     bool ok = (places != NULL && directions != NULL && vertex != NULL) ||
               err_set(e, "import check: out of memory");

@@ -125,7 +125,7 @@ static void put_mesh(const struct povray_writer *w, const struct object *o, doub
         vec3 n = geometric_normal(p);
         for (int k = 0; k < 3; k++) {
             fputs(k == 0 ? ",\n    " : ",", w->f);
-            povray_put(w, povray_moved(povray_at(p[k]), offset, n));
+            povray_put(w, povray_moved(d3_of(p[k]), offset, n));
             smooth |= dot(n, s->normal[3 * (size_t)i + (size_t)k]) < 1 - 1e-6f;
         }
     }
@@ -134,7 +134,7 @@ static void put_mesh(const struct povray_writer *w, const struct object *o, doub
         for (uint32_t i = o->first_triangle; i < o->first_triangle + o->num_triangles; i++)
             for (int k = 0; k < 3; k++) {
                 fputs(k == 0 ? ",\n    " : ",", w->f);
-                povray_put(w, povray_at(s->normal[3 * (size_t)i + (size_t)k]));
+                povray_put(w, d3_of(s->normal[3 * (size_t)i + (size_t)k]));
             }
     }
     if (material_has_map(&s->materials[o->material])) {
@@ -153,7 +153,7 @@ static void put_mesh(const struct povray_writer *w, const struct object *o, doub
 static void put_sphere(const struct povray_writer *w, const struct sphere *b, double offset)
 {
     fputs("sphere { ", w->f);
-    povray_put(w, povray_at(b->centre));
+    povray_put(w, d3_of(b->centre));
     fprintf(w->f, ", %.9g\n", b->radius + b->normal_out * offset);
     /* A ray that begins inside a body makes POV-Ray take the inner reflections of glass in there for
      * zero; `inverse` has the eye outside. */
@@ -300,15 +300,15 @@ static void put_camera(const struct povray_writer *w, const struct camera *c)
 {
     double width = 2 * (double)c->tan_h, height = 2 * (double)c->tan_v;
     fputs("camera { location ", w->f);
-    povray_put(w, povray_at(c->eye));
+    povray_put(w, d3_of(c->eye));
     fputs("\n  direction ", w->f);
-    povray_put(w, povray_moved(povray_moved(povray_moved((struct povray_point){0}, -1, c->backward),
+    povray_put(w, povray_moved(povray_moved(povray_moved((dvec3){0}, -1, c->backward),
                                             w->v->shift_x * width, c->right),
                                w->v->shift_y * height, c->up));
     fputs("\n  right ", w->f);
-    povray_put(w, povray_moved((struct povray_point){0}, width, c->right));
+    povray_put(w, povray_moved((dvec3){0}, width, c->right));
     fputs("\n  up ", w->f);
-    povray_put(w, povray_moved((struct povray_point){0}, height, c->up));
+    povray_put(w, povray_moved((dvec3){0}, height, c->up));
     fputs(" }\n", w->f);
 }
 

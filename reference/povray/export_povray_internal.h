@@ -4,6 +4,7 @@
 #define ASSAY_EXPORT_POVRAY_INTERNAL_H
 
 #include "export_povray.h"
+#include "renderer/math/mat4.h"
 
 struct povray_writer {
     FILE *f;
@@ -17,23 +18,13 @@ struct povray_writer {
     vec3 eye;
 };
 
-struct povray_point {
-    double x, y, z;
-};
-
-static inline struct povray_point povray_at(vec3 p)
+static inline dvec3 povray_moved(dvec3 p, double s, vec3 d)
 {
-    return (struct povray_point){(double)p.x, (double)p.y, (double)p.z};
-}
-
-static inline struct povray_point povray_moved(struct povray_point p, double s, vec3 d)
-{
-    return (struct povray_point){p.x + s * (double)d.x, p.y + s * (double)d.y,
-                                 p.z + s * (double)d.z};
+    return d3_add(p, d3_scale(d3_of(d), s));
 }
 
 /* "<x,y,z>", turned by the variant's rotation. The last zero is there so that no coordinate reads -0. */
-static inline void povray_put(const struct povray_writer *w, struct povray_point p)
+static inline void povray_put(const struct povray_writer *w, dvec3 p)
 {
     const double(*r)[3] = w->v->rotation;
     fprintf(w->f, "<%.9g,%.9g,%.9g>", r[0][0] * p.x + r[0][1] * p.y + r[0][2] * p.z + 0.0,

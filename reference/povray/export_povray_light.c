@@ -55,7 +55,7 @@ static void put_rectangle(const struct povray_writer *w, const struct povray_lam
             (double)l->radiance.r, (double)l->radiance.g, (double)l->radiance.b, (double)l->area, n,
             n);
     put_lamp_head(w, l, index, "P", n * n);
-    povray_put(w, povray_at(l->normal));
+    povray_put(w, d3_of(l->normal));
     put_lamp_tail(w);
     for (int i = 0; i < n; i++)
         for (int j = 0; j < n; j++) {
@@ -70,8 +70,7 @@ static void put_rectangle(const struct povray_writer *w, const struct povray_lam
                 v = (j + (double)r.u[1]) / n;
             }
             fprintf(w->f, "Lamp%u(", index);
-            povray_put(w,
-                       povray_moved(povray_moved(povray_at(l->corner), u, l->edge1), v, l->edge2));
+            povray_put(w, povray_moved(povray_moved(d3_of(l->corner), u, l->edge1), v, l->edge2));
             fputs(j == n - 1 ? ")\n" : ") ", w->f);
         }
 }
@@ -94,9 +93,9 @@ static void put_points(const struct povray_writer *w, const struct povray_lamp *
     put_lamp_tail(w);
     for (int i = 0; i < n; i++) {
         fprintf(w->f, "Lamp%u(", index);
-        povray_put(w, povray_at(p[i]));
+        povray_put(w, d3_of(p[i]));
         fputc(',', w->f);
-        povray_put(w, povray_at(normal[i]));
+        povray_put(w, d3_of(normal[i]));
         fputs(i % 4 == 3 || i == n - 1 ? ")\n" : ") ", w->f);
     }
 }
@@ -110,13 +109,13 @@ static void put_point(const struct povray_writer *w, const struct light *l)
                         : 1 / (2 * M_PI * d * d * (double)l->attenuation[2]);
     fprintf(w->f, "\n// %s light%s\nlight_source { ", l->kind == LIGHT_SPOT ? "spot" : "point",
             constant ? " without falloff" : "");
-    povray_put(w, povray_at(l->position));
+    povray_put(w, d3_of(l->position));
     povray_put_rgb(w, " rgb S*", c * (double)l->value.r, c * (double)l->value.g,
                    c * (double)l->value.b, "");
     if (l->kind == LIGHT_SPOT) {
         double cutoff = acos((double)l->cos_cutoff) * 180 / M_PI;
         fputs(" spotlight point_at ", w->f);
-        povray_put(w, povray_moved(povray_at(l->position), 1, l->axis));
+        povray_put(w, povray_moved(d3_of(l->position), 1, l->axis));
         fprintf(w->f, "\n    tightness %.9g radius %.12g falloff %.12g", (double)l->exponent,
                 cutoff, cutoff);
     }
@@ -129,10 +128,10 @@ static void put_directional(const struct povray_writer *w, const struct light *l
 {
     vec3 middle = scale(add(w->s->bounds_min, w->s->bounds_max), 0.5f);
     fputs("\n// directional light\nlight_source { ", w->f);
-    povray_put(w, povray_moved(povray_at(middle), 10 * w->plan->extent, l->to_light));
+    povray_put(w, povray_moved(d3_of(middle), 10 * w->plan->extent, l->to_light));
     povray_put_rgb(w, " rgb S*", (double)l->value.r / M_PI, (double)l->value.g / M_PI,
                    (double)l->value.b / M_PI, " parallel point_at ");
-    povray_put(w, povray_at(middle));
+    povray_put(w, d3_of(middle));
     fputs(" }\n", w->f);
 }
 

@@ -81,7 +81,7 @@ static bool check_camera(const struct scene *s, const struct camera *c, double e
                          struct err *e)
 {
     double nearest, farthest;
-    features_distances(s, c->eye, &nearest, &farthest);
+    features_distances(s, c, &nearest, &farthest);
     if (c->is_orthographic)
         return err_set(e, "POV-Ray: an orthographic camera is not verified");
     if (c->lens_radius > 0)

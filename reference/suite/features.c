@@ -1,6 +1,5 @@
 #include "features.h"
 
-#include "renderer/math/mat4.h"
 #include "renderer/scene/environment.h"
 
 #include <math.h>
@@ -54,22 +53,17 @@ const char *const feature_texts[NUM_FEATURES] = {
     [FEATURE_TEXTURE] = "textures",
 };
 
-static dvec3 wide(vec3 v)
+dvec3 features_normal(const vec3 *p)
 {
-    return d3(v.x, v.y, v.z);
-}
-
-static dvec3 unit_normal(const vec3 *p)
-{
-    dvec3 n = d3_cross(d3_sub(wide(p[1]), wide(p[0])), d3_sub(wide(p[2]), wide(p[0])));
+    dvec3 n = d3_cross(d3_sub(d3_of(p[1]), d3_of(p[0])), d3_sub(d3_of(p[2]), d3_of(p[0])));
     return d3_scale(n, 1 / d3_length(n));
 }
 
 static bool is_flat(const struct scene *s, uint32_t triangle)
 {
-    dvec3 n = unit_normal(s->position + 3 * (size_t)triangle);
+    dvec3 n = features_normal(s->position + 3 * (size_t)triangle);
     for (size_t k = 3 * (size_t)triangle; k < 3 * (size_t)triangle + 3; k++)
-        if (d3_length(d3_sub(wide(s->normal[k]), n)) > FLAT)
+        if (d3_length(d3_sub(d3_of(s->normal[k]), n)) > FLAT)
             return false;
     return true;
 }
@@ -91,35 +85,62 @@ static double gap(float p, float a, float b, float c)
 /* No more than that of the nearest point. */
 static double triangle_distance(const vec3 *p, vec3 eye)
 {
-    double plane = fabs(d3_dot(unit_normal(p), d3_sub(wide(eye), wide(p[0]))));
+    double plane = fabs(d3_dot(features_normal(p), d3_sub(d3_of(eye), d3_of(p[0]))));
     double box =
         d3_length(d3(gap(eye.x, p[0].x, p[1].x, p[2].x), gap(eye.y, p[0].y, p[1].y, p[2].y),
                      gap(eye.z, p[0].z, p[1].z, p[2].z)));
     return fmax(plane, box);
 }
 
-void features_distances(const struct scene *s, vec3 eye, double *nearest, double *furthest)
+/* Of one primitive: distances from the eye, depths along the view. */
+struct reach {
+    double distance[2], depth[2];
+};
+
+static struct reach triangle_reach(const vec3 *p, const struct camera *c)
+{
+    struct reach r = {{triangle_distance(p, c->eye), 0}, {INFINITY, -INFINITY}};
+    for (int k = 0; k < 3; k++) {
+        dvec3 to = d3_sub(d3_of(p[k]), d3_of(c->eye));
+        double depth = -d3_dot(to, d3_of(c->backward));
+        r.distance[1] = fmax(r.distance[1], d3_length(to));
+        r.depth[0] = fmin(r.depth[0], depth);
+        r.depth[1] = fmax(r.depth[1], depth);
+    }
+    return r;
+}
+
+static struct reach sphere_reach(const struct sphere *b, const struct camera *c)
+{
+    dvec3 to = d3_sub(d3_of(b->centre), d3_of(c->eye));
+    double d = d3_length(to), radius = (double)b->radius;
+    double depth = -d3_dot(to, d3_of(c->backward));
+    return (struct reach){{fabs(d - radius), d + radius}, {depth - radius, depth + radius}};
+}
+
+/* Triangles first. */
+static struct reach reach_of(const struct scene *s, uint32_t i, const struct camera *c)
+{
+    return i < s->num_triangles ? triangle_reach(s->position + 3 * (size_t)i, c)
+                                : sphere_reach(&s->spheres[i - s->num_triangles], c);
+}
+
+void features_distances(const struct scene *s, const struct camera *c, double *nearest,
+                        double *furthest)
 {
     *nearest = INFINITY;
     *furthest = 0;
-    for (uint32_t i = 0; i < s->num_triangles; i++) {
-        const vec3 *p = s->position + 3 * (size_t)i;
-        *nearest = fmin(*nearest, triangle_distance(p, eye));
-        for (int k = 0; k < 3; k++)
-            *furthest = fmax(*furthest, d3_length(d3_sub(wide(p[k]), wide(eye))));
-    }
-    for (uint32_t i = 0; i < s->num_spheres; i++) {
-        double d = d3_length(d3_sub(wide(s->spheres[i].centre), wide(eye)));
-        double r = (double)s->spheres[i].radius;
-        *nearest = fmin(*nearest, fabs(d - r));
-        *furthest = fmax(*furthest, d + r);
+    for (uint32_t i = 0; i < scene_num_primitives(s); i++) {
+        struct reach r = reach_of(s, i, c);
+        *nearest = fmin(*nearest, r.distance[0]);
+        *furthest = fmax(*furthest, r.distance[1]);
     }
 }
 
 static bool may_be_cut(const struct scene *s, const struct camera *c)
 {
     double nearest, furthest, lens = (double)c->lens_radius;
-    features_distances(s, c->eye, &nearest, &furthest);
+    features_distances(s, c, &nearest, &furthest);
     return !(nearest - lens > (double)c->near && furthest + lens < (double)c->far);
 }
 
@@ -192,7 +213,7 @@ bool features_check_clipping(const char *engine, const struct scene *s, const st
     double nearest, furthest;
     if (scene_num_primitives(s) == 0)
         return err_set(e, "%s: nothing to see: no triangles, no spheres", engine);
-    features_distances(s, c->eye, &nearest, &furthest);
+    features_distances(s, c, &nearest, &furthest);
     return !may_be_cut(s, c) ||
            err_set(e,
                    "%s: the near plane is at %g, the far plane is at %g: they may cut geometry, at "
@@ -200,56 +221,34 @@ bool features_check_clipping(const char *engine, const struct scene *s, const st
                    engine, (double)c->near, (double)c->far, nearest, furthest);
 }
 
-/* Of one primitive: distances from the lens, depths along the view. */
-struct reach {
-    double distance[2], depth[2];
-};
-
 /* What lies before the near plane, between, and beyond the far one. */
 struct layers {
     double before, seen[2], beyond; /* largest depth, smallest and largest, smallest */
     bool is_mixed;
 };
 
-static void sort_reach(const struct reach *r, const struct camera *c, struct layers *l)
+static void sort_reach(struct reach r, const struct camera *c, struct layers *l)
 {
     double lens = (double)c->lens_radius;
-    if (!(r->depth[1] > 0))
+    if (!(r.depth[1] > 0))
         return; /* behind the camera */
-    if (r->distance[1] + lens < (double)c->near) {
-        l->before = fmax(l->before, r->depth[1]);
-    } else if (r->distance[0] - lens > (double)c->far) {
-        l->beyond = fmin(l->beyond, r->depth[0]);
+    if (r.distance[1] + lens < (double)c->near) {
+        l->before = fmax(l->before, r.depth[1]);
+    } else if (r.distance[0] - lens > (double)c->far) {
+        l->beyond = fmin(l->beyond, r.depth[0]);
     } else {
         l->is_mixed |=
-            !(r->distance[0] - lens > (double)c->near && r->distance[1] + lens < (double)c->far);
-        l->seen[0] = fmin(l->seen[0], r->depth[0]);
-        l->seen[1] = fmax(l->seen[1], r->depth[1]);
+            !(r.distance[0] - lens > (double)c->near && r.distance[1] + lens < (double)c->far);
+        l->seen[0] = fmin(l->seen[0], r.depth[0]);
+        l->seen[1] = fmax(l->seen[1], r.depth[1]);
     }
 }
 
 static struct layers find_layers(const struct scene *s, const struct camera *c)
 {
     struct layers l = {.seen = {INFINITY, 0}, .beyond = INFINITY};
-    for (uint32_t i = 0; i < s->num_triangles; i++) {
-        const vec3 *p = s->position + 3 * (size_t)i;
-        struct reach r = {{triangle_distance(p, c->eye), 0}, {INFINITY, -INFINITY}};
-        for (int k = 0; k < 3; k++) {
-            dvec3 to = d3_sub(wide(p[k]), wide(c->eye));
-            double depth = -d3_dot(to, wide(c->backward));
-            r.distance[1] = fmax(r.distance[1], d3_length(to));
-            r.depth[0] = fmin(r.depth[0], depth);
-            r.depth[1] = fmax(r.depth[1], depth);
-        }
-        sort_reach(&r, c, &l);
-    }
-    for (uint32_t i = 0; i < s->num_spheres; i++) {
-        dvec3 to = d3_sub(wide(s->spheres[i].centre), wide(c->eye));
-        double d = d3_length(to), radius = (double)s->spheres[i].radius;
-        double depth = -d3_dot(to, wide(c->backward));
-        struct reach r = {{fabs(d - radius), d + radius}, {depth - radius, depth + radius}};
-        sort_reach(&r, c, &l);
-    }
+    for (uint32_t i = 0; i < scene_num_primitives(s); i++)
+        sort_reach(reach_of(s, i, c), c, &l);
     return l;
 }
 
@@ -275,7 +274,7 @@ bool features_clip_depths(const char *engine, const struct scene *s, const struc
 bool features_check_axes(const char *engine, const struct camera *c, struct err *e)
 {
     double square = (double)c->tan_h * c->height / c->width;
-    dvec3 right = wide(c->right), up = wide(c->up), back = wide(c->backward);
+    dvec3 right = d3_of(c->right), up = d3_of(c->up), back = d3_of(c->backward);
     if (!(fabs((double)c->tan_v / square - 1) < 1e-5))
         return err_set(e, "%s: the camera's pixels are not square (tan_h %g, tan_v %g, %d x %d)",
                        engine, (double)c->tan_h, (double)c->tan_v, c->width, c->height);
@@ -287,9 +286,9 @@ bool features_check_axes(const char *engine, const struct camera *c, struct err 
 bool features_check_normals(const char *engine, const struct scene *s, struct err *e)
 {
     for (uint32_t i = 0; i < s->num_triangles; i++) {
-        dvec3 n = unit_normal(s->position + 3 * (size_t)i);
+        dvec3 n = features_normal(s->position + 3 * (size_t)i);
         for (size_t k = 3 * (size_t)i; k < 3 * (size_t)i + 3; k++)
-            if (!(d3_dot(wide(s->normal[k]), n) > 0))
+            if (!(d3_dot(d3_of(s->normal[k]), n) > 0))
                 return err_set(e, "%s: object '%s' has a shading normal behind its triangle",
                                engine, s->objects[s->tri_object[i]].name);
     }

@@ -3,6 +3,7 @@
 #ifndef ASSAY_FEATURES_H
 #define ASSAY_FEATURES_H
 
+#include "renderer/math/mat4.h"
 #include "renderer/scene/camera.h"
 
 enum feature {
@@ -46,7 +47,11 @@ bool features_are_smooth(const struct scene *s, uint32_t first, uint32_t num);
 
 /* Distances from the eye: no more than that of the nearest point of the scene (a triangle counts with
  * the larger of its plane's and its box's), and that of the furthest. */
-void features_distances(const struct scene *s, vec3 eye, double *nearest, double *furthest);
+void features_distances(const struct scene *s, const struct camera *c, double *nearest,
+                        double *furthest);
+
+/* The unit geometric normal of three corners. */
+dvec3 features_normal(const vec3 *p);
 
 /* What a kind of material is called in the line of an engine that does not have it. */
 extern const char *const features_material_names[NUM_MATERIAL_KINDS];

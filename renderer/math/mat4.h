@@ -3,6 +3,8 @@
 #ifndef ASSAY_MAT4_H
 #define ASSAY_MAT4_H
 
+#include "vec.h"
+
 #include <math.h>
 #include <stdbool.h>
 
@@ -17,6 +19,14 @@ typedef struct {
 static inline dvec3 d3(double x, double y, double z)
 {
     return (dvec3){x, y, z};
+}
+static inline dvec3 d3_of(vec3 v)
+{
+    return (dvec3){(double)v.x, (double)v.y, (double)v.z};
+}
+static inline dvec3 d3_add(dvec3 a, dvec3 b)
+{
+    return (dvec3){a.x + b.x, a.y + b.y, a.z + b.z};
 }
 static inline dvec3 d3_sub(dvec3 a, dvec3 b)
 {
