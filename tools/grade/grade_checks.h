@@ -10,8 +10,8 @@
 struct answer {
     struct moments m; /* of the reference; width 0: none */
     struct moments
-        twin; /* where m is a render of ours for a check of kind equal: another, of a seed of its own, by which
-                 copies of m are told (same_noise.h); else width 0 */
+        twin; /* where m is a render of ours for a check of kind equal: another with a seed of its own,
+               * to recognise copies of m (same_noise.h); else width 0 */
     struct moments
         noise; /* of a render by ours: how its samples vary; m itself where that is ours */
     struct moments
@@ -34,13 +34,14 @@ void answer_key_free(struct answer_key *a);
 
 /* The set of that name; 0 where the rubric has none. */
 int answer_key_set(const struct rubric *r, const char *name);
-/* With the deviations of `set`, where these change it: the image as it should be (NULL: the rubric gives none), and how many
- * samples each of its pixels takes. */
+/* With the deviations of `set`, where these change the image: the image as it should be (NULL: the rubric
+ * gives none), and how many samples each of its pixels takes. */
 const struct moments *answer_key_image(const struct answer_key *a, int set, int image);
 const struct moments *answer_key_counts(const struct answer_key *a, int set, int image);
 
-/* One image by opt->pathtracer with spp samples a pixel and `words` besides: as its reference is made, or as_asked:
- * with the student's options too. Scenes have been staged in opt->cache/scene (submission_stage()). */
+/* Renders one image by opt->pathtracer with spp samples a pixel and the further options `words`: with the
+ * options of its reference or, as_asked, with the student's, too. Scenes have been staged in
+ * opt->cache/scene (submission_stage()). */
 NODISCARD bool answer_key_render(const struct rubric *r, int image, bool as_asked,
                                  const char *words, int spp, const struct answer_options *opt,
                                  struct moments *out, struct err *e);
@@ -58,20 +59,22 @@ double score_more(const struct margin *m, const struct interval *i, double blur)
 /* Where no more samples can be had, width costs points: 1 up to margin.none, 0 from twice that. */
 double score_width(const struct margin *m, const struct interval *i);
 
-/* The chance that a fresh run of the same program, with the estimate as its truth, gets another share; 1 where the
- * share lies between 0 and 1. For a program that is within margin.full the chance of less than all is at most alpha
- * by the interval itself, whatever its noise. */
+/* The probability that a fresh run of the same program gets another share, if the estimate is the truth;
+ * 1 where the share lies between 0 and 1. For a program that is within margin.full the interval itself
+ * ensures, whatever the noise, that less than all points have a probability of at most alpha. */
 double score_chance(const struct margin *m, const struct interval *i);
 
 struct result {
     double share;  /* 0 .. 1 of the points */
     double chance; /* score_chance() of what decided */
     bool
-        judged; /* false: our trouble, not the student's: `seen` says what; share is 0 and staff have to look */
+        judged; /* false: we could not judge, through no fault of the student's: `seen` says why; share
+                 * is 0 and staff have to look */
     double
-        more; /* > 0: not decided, it takes about so many times the samples; share is what it may still be */
+        more; /* > 0: undecided, it takes about so many times the samples; share is the most it may get */
     double noise
-        [CHECK_IMAGES]; /* variance that each image of the check adds, in some unit; or skewness, where that keeps it undecided */
+        [CHECK_IMAGES]; /* variance that each image of the check adds, in some unit; or skewness, where
+                         * that keeps it undecided */
     char expected[256], seen[400];
     char accepted[160]; /* the deviations by which it has more points than without, or "" */
     char carried[512];  /* what was paid before and is taken for granted here (carried.h), or "" */
@@ -90,8 +93,8 @@ struct submitted_images {
     struct made made[RUBRIC_IMAGES];
     struct submitted_image image[RUBRIC_IMAGES]; /* mean NULL: not there, or not readable */
     char why[RUBRIC_IMAGES][400];                /* why not */
-    bool can_buy;              /* more samples can be had: what is too noisy is left undecided */
-    bool fixed[RUBRIC_IMAGES]; /* but not of this image, whose noise does not fall with them */
+    bool can_buy;              /* further runs are possible: what is too noisy stays undecided */
+    bool fixed[RUBRIC_IMAGES]; /* but not of this image, whose noise does not fall with samples */
     int runs[RUBRIC_IMAGES];   /* made of it, whether they count or not */
     double bought_s;           /* CPU time of further runs */
 };
@@ -102,19 +105,21 @@ struct grading {
     const struct answer_key *a;
     struct submitted_images *h;
     double alpha; /* of one check: the chance that a program which is right loses points in it */
-    const struct rubric_bugs *bugs; /* NULL: none are told by the images */
+    const struct rubric_bugs *bugs; /* NULL: no catalogue of bugs for these images */
 };
 
-/* One check against the answers with the deviations of `set`. Fails only for our own trouble. The caller frees with result_free(). */
+/* Judges one check against the answers with the deviations of `set`. Fails only for reasons of our own,
+ * such as memory. The caller frees with result_free(). */
 NODISCARD bool grade_checks_run(const struct grading *g, const struct rubric_check *check, int set,
                                 struct result *out, struct err *e);
 
-/* The times of a check of growth, whatever its images show: CPU time of P less Q over that of R less S, two scenes with many
- * and few samples, so that reading the scene and building the hierarchy cancel. Judged at the end of the interval that is best for the program. */
+/* Judges a check of growth by times alone, whatever its images show: the CPU time of P less that of Q
+ * over that of R less that of S, two scenes with many and few samples each, so that reading the scene
+ * and building the hierarchy cancel. The end of the interval that is best for the program counts. */
 void grade_checks_growth(const struct grading *g, const struct rubric_check *c, struct result *out);
 
-/* `rates` as the check itself, but of the number of samples that the rule takes with the light and the noise of the program's
- * own image; what cannot be told is left as it is. */
+/* Judges `rates` by the number of samples that the stopping rule takes with the light and the noise of
+ * the program's own image; *out stays as it is where that is not known. */
 void grade_checks_rates(const struct grading *g, int set, const struct rubric_check *c,
                         struct result *out);
 

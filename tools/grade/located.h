@@ -1,4 +1,4 @@
-/* Where a mistake without a name sits: what images that are wrong have in common that right ones have not. */
+/* Locates a mistake that has no name: what wrong images have in common and right images have not. */
 #ifndef ASSAY_LOCATED_H
 #define ASSAY_LOCATED_H
 
@@ -10,8 +10,9 @@ struct located {
     int image; /* that shows it; -1: none */
 };
 
-/* share: of all checks, against right images. An image that is there is wrong if an `equal` or `exact` check of it lost points, right if it
- * has such checks and none lost. Said of facts about scene, options and bounces that all wrong images share and no right one has. */
+/* share: of all checks, against right images. An image is wrong if an `equal` or `exact` check of it
+ * lost points, right if it has such checks and none lost points. Names the facts about scene, options
+ * and bounces that all wrong images have and no right one has. */
 struct located located_by(const struct grading *g, const double *share);
 
 #endif

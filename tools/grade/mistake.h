@@ -1,4 +1,5 @@
-/* What a program did wrong: named, if a known bug explains its images, or located; and paid once. */
+/* What a program did wrong: a known bug's name, if one explains its images, else where it shows. Points
+ * that other parts lost by the same mistake come back. */
 #ifndef ASSAY_MISTAKE_H
 #define ASSAY_MISTAKE_H
 
@@ -7,16 +8,17 @@
 
 struct mistake {
     bool judged;            /* points were lost: */
-    bool looked;            /* images were held against the catalogue: */
+    bool looked;            /* images were compared with the catalogue: */
     struct diagnosis found; /* named or not; never FINDING_CORRECT, as points were lost */
     int with;               /* the deviations on top of which */
     char why[200];          /* there is no diagnosis; "" */
     struct located located; /* where nothing is named */
 };
 
-/* result: of all checks as graded with the deviations of *set; points that were lost for what another part pays come back. Where a bug is found on
- * top of other accepted deviations, *set becomes those. Only for programs that
- * lost points. Fails only for our own trouble. */
+/* result: of all checks as graded with the deviations of *set; points that were lost for a mistake that
+ * another part already pays for come back. Where a bug is found on top of other accepted deviations,
+ * *set becomes those. Only for programs that lost points. Fails only for reasons of our own, such as
+ * memory. */
 NODISCARD bool mistake_judge(const struct grading *g, int *set, struct result *result,
                              struct mistake *out, struct err *e);
 

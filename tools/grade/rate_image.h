@@ -7,15 +7,16 @@
 
 struct rate_image {
     double pixels,
-        odd; /* odd: of a colour that no multiple of the batch has, to one sample and 2 codes */
-    double early;    /* that did not take all samples */
+        odd; /* pixels of a colour that no multiple of the batch has, within one sample and 2 codes */
+    double early;    /* pixels that did not take all samples */
     double mean;     /* samples a pixel */
     double more, sd; /* mean over that of `expected`, less 1, and its standard deviation */
 };
 
-/* Of an image of the rubric. ours: n is the samples of each pixel in a render of ours (they hardly depend on each other: the
- * difference of two such counts varies from pixel to pixel by noise alone). Fails on what is no image of that size, and where batches
- * are too small against all samples to tell apart. */
+/* Reads the rate image of an image of the rubric. ours: its n is the number of samples of each pixel in
+ * a render of ours. (Counts of two renders are nearly independent: their difference varies from pixel
+ * to pixel by noise alone.) Fails if the file is no image of that size, and if a batch is too small a
+ * part of all samples for colours to tell counts apart. */
 NODISCARD bool rate_image_read(const char *path, const struct rubric_image *p, int batch,
                                const struct moments *ours, struct rate_image *out, struct err *e);
 

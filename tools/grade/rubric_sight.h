@@ -1,10 +1,12 @@
-/* What an image of a rubric shows, in cells (signature.h): that of an 8-bit file, or what a render of ours would show in one.
+/* The cells (signature.h) of an image of a rubric: of a student's 8-bit file, or of a render of ours as
+ * it would be in such a file.
  *
- * Cells hold what an image of the rubric's curve and of as many samples as are asked for shows on average: E[min(X, clip)]
- * of each pixel, X normal with the mean and the variance of a render of ours, clip the radiance of the brightest code.
- * Decoded codes are the middle of their bin; half a bin, by which a flat cell may be off and which noise dithers away, is
- * added to the standard deviation of a student's cell, so rounding and clipping are part of every likelihood. Images of
- * adaptive sampling have FACT_SAMPLES, by the rate image. */
+ * Cells of a render hold the expected content of an image with the rubric's curve and as many samples as
+ * are asked for: E[min(X, clip)] of each pixel, X normal with the mean and the variance of our render,
+ * clip the radiance of the brightest code. A student's code stands for the middle of its bin. Half a
+ * bin, by which a flat cell may be off and which noise dithers away, is added to the standard deviation
+ * of the student's cell; so rounding and clipping are part of every likelihood. Images of adaptive
+ * sampling have FACT_SAMPLES, read from the rate image. */
 #ifndef ASSAY_RUBRIC_SIGHT_H
 #define ASSAY_RUBRIC_SIGHT_H
 
@@ -16,8 +18,9 @@ double rubric_sight_clip(const struct rubric *r);
 /* Is the number of an image's samples a fact (a check of rates)? */
 bool rubric_sight_counts(const struct rubric *r, int image);
 
-/* Of a render of ours: mean, variance of the mean, n = samples in a cell. as_asked: of counting images, n as if all had been
- * taken, and FACT_SAMPLES. Fails on a size that is not of whole cells. */
+/* Cells of a render of ours: mean, variance of the mean, n = samples in a cell. as_asked: for images
+ * whose samples are a fact, n as if all had been taken, and FACT_SAMPLES. Fails on a size that is not a
+ * whole number of cells. */
 NODISCARD bool rubric_sight_of_render(const struct rubric *r, int image, bool as_asked,
                                       const struct moments *m, struct signature *out,
                                       struct err *e);
@@ -25,8 +28,9 @@ NODISCARD bool rubric_sight_of_render(const struct rubric *r, int image, bool as
 /* The variance of a student's cell that has a masked pixel: it says nothing. */
 extern const double rubric_sight_masked;
 
-/* Of a student's image, which is there. right: the reference, as_asked of counting images; correct: its cells. A program that
- * is noisier than ours (median of the cells) has that variance. */
+/* Cells of a student's image, which exists. right: the reference, `as_asked` for images whose samples
+ * are a fact; correct: its cells. The variance of a program that is noisier than ours (median of the
+ * cells) is raised accordingly. */
 NODISCARD bool rubric_sight_of_student(const struct rubric *r, int image,
                                        const struct submitted_images *h, const struct answer *right,
                                        const struct signature *correct, struct signature *out,

@@ -1,16 +1,18 @@
-/* What the assignment's rule of stopping does to the samples of a program that are noisier than ours. */
+/* The assignment's stopping rule of adaptive sampling: its bias and its number of samples, for a program
+ * whose samples are noisier than ours. */
 #ifndef ASSAY_STOPPING_RULE_H
 #define ASSAY_STOPPING_RULE_H
 
 #include "difference.h"
 #include "tools/submission/rubric.h"
 
-/* The rule: after every `batch` samples of a pixel stop if 1.96 sqrt(var/n) <= tolerance mean. It is biased: a pixel whose first
- * batch is black by chance stays black. By how much, and after how many samples it stops, depends on mean, variance and shape of the
- * samples. Mean and variance are known: those of our samples, and kappa, the noise of the student's image over what
- * ours would have at the counts of its rate image, tile by tile (difference.h). The shape is not, so several are tried: no
- * fluctuation; a sample c or c + a with c = 0, which is the shape that is black most often; and rarer, higher a over a
- * brighter c. Each by simulation (8 runs), with kappa at both ends of its interval. */
+/* The rule: after every `batch` samples of a pixel stop if 1.96 sqrt(var/n) <= tolerance mean. It is
+ * biased: a pixel whose first batch is black by chance stays black. Bias and number of samples depend on
+ * mean, variance and shape of the distribution of samples. Mean and variance are known: those of our
+ * samples, times kappa, the noise of the student's image over what ours would have at the counts of its
+ * rate image, tile by tile (difference.h). The shape is not known, so several are simulated: no
+ * fluctuation; samples c or c + a with c = 0, the shape that is black most often; and rarer, higher a
+ * over a brighter c. Each in 8 runs, with kappa at both ends of its interval. */
 enum stopping_kind {
     STOPS_RIGHTLY,
     STOPS_BY_ONE_SIGMA, /* sqrt(var/n) <= tolerance mean */
@@ -33,9 +35,9 @@ NODISCARD bool stopping_rule_range(const struct rubric_image *p, const struct su
 /* The rule of a program with this bug of the catalogue. */
 enum stopping_kind stopping_rule_of(const char *bug);
 
-/* How many samples s takes by each rule, if it has the light and the noise that it shows, whatever its other mistakes: the mean
- * of each tile is its own, and kappa holds its variance against ours at the right image. m as above. Fails where
- * too little of the image says something. */
+/* How many samples s takes by each rule, given the light and the noise that it shows, whatever its other
+ * mistakes: each tile has its own mean, and kappa compares its variance with ours at the right image. m
+ * as above. Fails where too little of the image can be judged. */
 NODISCARD bool stopping_rule_samples(const struct rubric_image *p, const struct submitted_image *s,
                                      const struct moments *m,
                                      struct stopping out[NUM_STOPPING_KINDS], struct err *e);

@@ -1,10 +1,12 @@
-/* A student's image: what a file says of each pixel, by the course's tone curve where it is one of codes, and
- * made fit for a comparison. No noise is stated by such files: how much there should be is known from renders of ours.
+/* A student's image, prepared for comparison: radiance of each pixel, decoded by the course's tone curve
+ * if the file has codes. Such files do not state their noise; how much there should be is known from
+ * renders of ours.
  *
- * Clipping. A code of 255 says "at least so much". Dropping pixels because they came out saturated would choose
- * them by their noise, and would hide an image that is white where it should not be. So the reference decides:
- * where it lies within 5 standard errors of the clipping point (those of a render with as many samples, from the
- * reference's own variance of a sample) nothing is compared; elsewhere both sides are cut off at that point. */
+ * Clipping. A code of 255 means "at least so much". To drop pixels because they are saturated would
+ * select them by their noise, and would hide an image that is white where it should not be. So the
+ * reference decides: where it lies within 5 standard errors of the clipping point (of a render with as
+ * many samples, from the reference's own variance of a sample) nothing is compared; elsewhere both sides
+ * are clipped at that point. */
 #ifndef ASSAY_SUBMITTED_IMAGE_H
 #define ASSAY_SUBMITTED_IMAGE_H
 
@@ -27,35 +29,38 @@ struct submitted_image {
     int num_runs;
 };
 
-/* curve: of integer files (tone_curve.h). Fails, with a line fit for the student, on what is no image of that size.
- * The header is looked at before anything is decoded. The caller frees with submitted_image_free(). */
+/* curve: of integer files (tone_curve.h). Fails, with a line fit for the student, on a file that is no
+ * image of that size. The header is checked before anything is decoded. The caller frees with
+ * submitted_image_free(). */
 NODISCARD bool submitted_image_read(const char *path, const char *curve, int width, int height,
                                     struct submitted_image *out, struct err *e);
 void submitted_image_free(struct submitted_image *s);
 
-/* Makes s the mean of its runs and of one more, weighted by their samples (spp of both is set), and takes that over. A run
- * of less than a third of the samples of the largest is kept, but no part of the mean: it says little, and its noise is
- * cut off at the clipping point sooner. Fails, and leaves *more to the caller, where memory is short. */
+/* Adds a run and takes it over: s becomes the mean of its runs, weighted by their samples (spp of both is
+ * set). A run with less than a third of the samples of the largest is kept but not part of the mean: it
+ * adds little, and its noise reaches the clipping point sooner. Fails, and leaves *more to the caller,
+ * if memory is short. */
 NODISCARD bool submitted_image_add_run(struct submitted_image *s, struct submitted_image *more,
                                        struct err *e);
 
 /* Are they the same values, pixel by pixel? */
 bool submitted_image_same(const struct submitted_image *a, const struct submitted_image *b);
 
-/* Sets variance and k3 to those that a render of spp samples by our renderer has, whose moments are m: means over
- * 3 x 3 pixels, as what is rare may have been missed in one. A pixel beyond the clipping point does not vary. Of an
- * image of several runs spp is that of each, whatever is given. */
+/* Sets variance and k3 to those of a render of ours with spp samples, by the moments m of one: averages
+ * over 3 x 3 pixels, as rare samples may be missing in one. A pixel beyond the clipping point does not
+ * vary. For an image of several runs the spp of each run counts, not the argument. */
 void submitted_image_expect(struct submitted_image *s, const struct moments *m, double spp);
 
-/* An image of the same kind as `like`: what m says, with the known variance of its mean; m NULL: black. */
+/* Makes an image of the same kind as `like` from m, with the known variance of its mean; m NULL: black. */
 NODISCARD bool submitted_image_from(const struct moments *m, const struct submitted_image *like,
                                     struct submitted_image *out, struct err *e);
 
-/* Without the runs, but with what they measured. The caller frees it with submitted_image_free(). */
+/* Copies s without its runs, but with what they measured. The caller frees it with submitted_image_free(). */
 NODISCARD bool submitted_image_copy(const struct submitted_image *s, struct submitted_image *out,
                                     struct err *e);
 
-/* `measured` of an image of one run: kappa times its expected variance, and its rounding; kappa 0: nothing is measured. */
+/* Sets `measured` of an image of one run: kappa times its expected variance, plus its rounding; kappa 0:
+ * nothing is measured. */
 void submitted_image_model(struct submitted_image *s, double kappa);
 
 /* Scales k3, expected of our samples, to the noise that is measured in each tile: as skewed as ours. */
@@ -73,10 +78,11 @@ NODISCARD bool submitted_image_comparable(const struct submitted_image *s, const
                                           double spp, bool measured, unsigned char *use,
                                           struct err *e);
 
-/* The same without a reference: use[p] becomes 0 where s is clipped and beside that, elsewhere nonzero. */
+/* The same without a reference: use[p] becomes 0 where s is clipped and beside that, elsewhere
+ * nonzero. */
 void submitted_image_unclipped(const struct submitted_image *s, unsigned char *use);
 
-/* Standard deviation that channel i (3 per pixel) of a render of spp samples has, by the reference's samples. */
+/* Standard deviation of channel i (3 per pixel) in a render of spp samples, by the reference's samples. */
 double submitted_image_expected_sd(const struct moments *reference, size_t i, double spp);
 
 #endif

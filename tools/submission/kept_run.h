@@ -1,5 +1,6 @@
-/* Runs of submissions, kept by all that decides them: what is graded again by other points, margins, hints or references is not
- * run again. A run is a directory of its own, STORE/KEY: the files that it handed out, its log, and last of all run.json. */
+/* A store of runs of submissions, with a key of all that decides a run: grading again with other points,
+ * margins, hints or references runs nothing again. A run is a directory STORE/KEY: the files that it
+ * handed out, its log, and run.json, which is written last. */
 #ifndef ASSAY_KEPT_RUN_H
 #define ASSAY_KEPT_RUN_H
 
@@ -7,16 +8,18 @@
 
 #include "renderer/base/fs.h"
 
-/* STORE/KEY of a job. of: what its tree is, and what else tells it from others; inputs: the files in job->scene that it reads (NULL
- * at the end); its limits count, as they decide how it ends. */
+/* STORE/KEY of a job. of: a text that identifies its tree and whatever else distinguishes it; inputs: the
+ * files in job->scene that it reads (NULL at the end). Its limits are part of the key, as they decide how
+ * it ends. */
 NODISCARD bool kept_run_path(const char *store, const char *of, const struct sandbox *s,
                              const struct sandbox_job *job, const char *const *inputs,
                              struct path *dir, struct err *e);
 
-/* As if the job had been run now: its files are in job->out, its log is at job->log. False: it is not there. */
+/* Restores a run as if the job had been run now: its files are in job->out, its log is at job->log.
+ * False: it is not in the store. */
 bool kept_run_read(const char *dir, const struct sandbox_job *job, struct sandbox_result *out);
 
-/* Keeps it. */
+/* Adds a run to the store. */
 NODISCARD bool kept_run_write(const char *dir, const struct sandbox_job *job,
                               const struct sandbox_result *result, struct err *e);
 

@@ -1,6 +1,7 @@
-/* A rubric: what a course asks of a submission, what it is worth, and what is said where it is not met; its manual is
- * tools/docs/formats/rubric.md. A file of lines, one statement each, because staff edit it by hand, and because every
- * mistake can be told with its line, which a JSON tree has lost. Lists below stand in the order of the file. */
+/* A rubric: what a course asks of a submission, how many points it gives, and what is said where it is not
+ * met; its manual is tools/docs/formats/rubric.md. A file of lines, one statement each, because staff
+ * edit it by hand, and because every mistake can be reported with its line, which a JSON tree has lost.
+ * Lists below are in the order of the file. */
 #ifndef ASSAY_RUBRIC_H
 #define ASSAY_RUBRIC_H
 
@@ -43,7 +44,7 @@ struct accepted {
     char name[48], how[256]; /* words, or a file */
 };
 
-/* What a program may do wrong for which it is not to blame, all at once. The first set is empty. */
+/* A set of accepted deviations that a program may have all at once. The first set is empty. */
 struct rubric_set {
     char name[160];  /* "light_pdf, turned_lamp" */
     char words[800]; /* "" of those by images */
@@ -78,7 +79,7 @@ struct rubric_check {
     int images[CHECK_IMAGES], num_images; /* indices */
     struct margin image, tile, share, log_ratio, count, carried;
     int batch;
-    int after; /* index of the image of an earlier part by which a mistake is carried on; -1: none */
+    int after; /* index of the image of an earlier part that the mistake may come from; -1: none */
     char title[160], hint[512], where[160], visibility[24];
 };
 
@@ -117,16 +118,18 @@ struct rubric_mistakes {
     } at[64];
 };
 
-/* Reads the file and looks for mistakes, all of them; *m is sorted by line. Scenes named are looked up in the
- * suite, which has to outlive the rubric. variant: what "{variant}" stands for where the rubric has variants; 0: the first. Fails only if the file cannot be read or is longer than 1 MiB; a
- * rubric with mistakes is not to be used. *out is large: not for the stack. */
+/* Reads the file and finds all of its mistakes; *m is sorted by line. Scenes named are looked up in the
+ * suite, which has to outlive the rubric. variant: what "{variant}" stands for where the rubric has
+ * variants; 0: the first. Fails only if the file cannot be read or is longer than 1 MiB; a rubric with
+ * mistakes must not be used. *out is large: not for the stack. */
 NODISCARD bool rubric_read(const char *path, const struct suite *suite, int variant,
                            struct rubric *out, struct rubric_mistakes *m, struct err *e);
 
-/* The number after an option of an image, or the k-th further one: `-a BATCH TOLERANCE`; 0: it has none. */
+/* The number after an option of an image; k 1: the one after that, as in `-a BATCH TOLERANCE`. 0: there is
+ * none. */
 double rubric_option(const struct rubric_image *p, const char *option, int k);
 
-/* Does a pixel stop by itself (`-a BATCH TOLERANCE` with a batch of at most spp)? */
+/* Is the image sampled adaptively (`-a BATCH TOLERANCE` with a batch of at most spp)? */
 bool rubric_is_adaptive(const struct rubric_image *p);
 
 double rubric_points(const struct rubric *r);

@@ -1,4 +1,4 @@
-/* Shared by rubric.c, which reads statements, and rubric_check.c, which looks at the whole. */
+/* Shared by rubric.c, which reads statements, and rubric_check.c, which checks the whole. */
 #ifndef ASSAY_RUBRIC_INTERNAL_H
 #define ASSAY_RUBRIC_INTERNAL_H
 

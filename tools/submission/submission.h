@@ -13,7 +13,7 @@ enum submission_kind {
 };
 extern const char *const submission_kind_name[]; /* "images", "program", "source" */
 
-/* What keeps all of its images from being made. */
+/* Why none of its images could be made. */
 enum submission_state {
     SUBMISSION_GRADED,      /* nothing */
     SUBMISSION_NOT_BUILT,   /* it cannot be unpacked or built */
@@ -47,50 +47,54 @@ struct made {
     double cpu_s, wall_s;
 };
 
-/* Directory of what all runs need, made once: scenes and environments of the rubric's images, by their last
- * names, which have to differ. */
+/* Makes the directory of what all runs need, once: scenes and environments of the rubric's images, by their
+ * base names, which have to differ. */
 NODISCARD bool submission_stage(const struct rubric *r, const char *dir, struct err *e);
 
-/* Looks what it is and packs it. work: a directory of its own below the sandbox's. What is wrong with the
- * submission is in out->why; false only if we cannot go on. */
+/* Finds out what kind of submission it is and packs it. work: a directory of its own below the sandbox's.
+ * What is wrong with the submission is in out->why; false only if we cannot go on. */
 NODISCARD bool submission_open(const struct rubric *r, const char *path, const char *work,
                                struct submission *out, struct err *e);
 
 /* The last part of a path without the ending of an archive; "" if that is no name. */
 void submission_id(const char *path, char id[128]);
 
-/* A run of it, or what it was before, if that is kept (kept_run.h). inputs: the files in job->scene that it reads. */
+/* Runs it, or restores the same run if that was kept (kept_run.h). inputs: the files in job->scene that it
+ * reads. */
 NODISCARD bool submission_run(const struct rubric *r, const struct sandbox *box,
                               const struct submission *s, const struct sandbox_job *job,
                               const char *const *inputs, struct sandbox_result *out, struct err *e);
 
-/* Unpacks it, builds it in the sandbox, if it is to be built, and looks whether the program would start. The build's output goes to
- * `log`. cache: of ccache (sandbox.h), or NULL; `fill`: it is staff who fill it. */
+/* Unpacks it, builds it in the sandbox if it has to be built, and checks that the program would start. The
+ * build's output goes to `log`. cache: of ccache (sandbox.h), or NULL; fill: staff fill it. */
 NODISCARD bool submission_build(const struct rubric *r, const struct sandbox *box,
                                 const char *cache, bool fill, const char *work, const char *log,
                                 struct submission *s, struct err *e);
 
-/* One image of the rubric, or one like it with another name and other samples: found, or made in the sandbox and
- * then moved to out_dir, where its log goes too. An image that is not there is no error: made->why says so. */
+/* Gets one image of the rubric, or one like it with another name and other samples: finds it among those
+ * handed in, or makes it in the sandbox and moves it to out_dir, where its log goes, too. A missing image
+ * is no error: made->why says so. */
 NODISCARD bool submission_image(const struct rubric *r, const struct sandbox *s,
                                 const struct submission *sub, const struct rubric_image *p,
                                 const char *stage, const char *work, const char *out_dir,
                                 uint64_t seed, int threads, struct made *made, struct err *e);
 
-/* Is it in vain to run the program for that image, as it has not ended on the same scene with hardly more samples, or on three
- * scenes while it made no image at all? made: of the images before it; *out says so. */
+/* Would the program probably not end on that image? Yes if it did not end on the same scene with at most 8
+ * times the work, or on three scenes while it made no image at all. made: of the images before it; *out
+ * says why. */
 bool submission_will_hang(const struct rubric *r, const struct made *made, int image,
                           struct made *out);
 
-/* Did a program that made no image print how it is used? why: gets what it complains of, or the first line of that text. */
+/* Did a program that made no image print its usage text? why: gets its complaint, or the first line of that
+ * text. */
 bool submission_printed_usage(const char *log, char *why, size_t size);
 
-/* After all images: where none could be read says so once, in s->state and s->why. why: of each image, which then refers to that, if it
- * is the same of all. */
+/* After all images: if none could be read, says so once, in s->state and s->why. why: of each image; if all
+ * have the same reason, each then refers to s->why. */
 void submission_conclude(const struct rubric *r, const struct made *made, char (*why)[400],
                          struct submission *s);
 
-/* The command of an image in words: NULL at the end; they live in `text`. `threads` and `seed` as given, the
+/* The command of an image as words with NULL at the end, which live in `text`; threads and seed as given, the
  * output by its name in the rubric. False if it is too long. */
 bool submission_command(const struct rubric *r, const struct rubric_image *p, const char *program,
                         uint64_t seed, int threads, char *text, size_t size, const char **argv,
