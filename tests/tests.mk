@@ -253,14 +253,14 @@ rubric-bugs: all $(BUILD)/deps-test $(BUILD)/libassay.a $(BUILD)/tests/make_rubr
 #:                 where it was ended; SHRINK=4: smaller images; VERDICTS=1: two scenes against Blender and POV-Ray, 8 more)
 writeup: $(BUILD)/assay $(BUILD)/pathtracer
 	VERDICTS=$(VERDICTS) tests/studies/writeup/writeup.sh $(BUILD) $(SHRINK)
-#: make pictures   the two images that README shows (tools/docs/images)
-pictures: $(BUILD)/assay $(BUILD)/pathtracer $(BUILD)/browser/package-lock.json
-	$(BUILD)/assay validate -q --out $(BUILD)/pictures --only 12_point_plane --only 41_cornell --only 42_cornell_glass --only 46_sky --only 95_one_bounce_less
-	$(BUILD)/pathtracer -q -r 360x360 -s 1024 -f $(BUILD)/pictures/render.png reference/scenes/42_cornell_glass.dae
-	$(BUILD)/pathtracer -q -s 64 -r 240x180 --seed 1 -f $(BUILD)/pictures/1.exr reference/scenes/41_cornell.dae
-	$(BUILD)/pathtracer -q -s 64 -r 240x180 --seed 2 -m 2 -f $(BUILD)/pictures/2.exr reference/scenes/41_cornell.dae
-	$(BUILD)/assay compare -q --margin 0.01 --report $(BUILD)/pictures/compared.html $(BUILD)/pictures/1.exr $(BUILD)/pictures/2.exr || test $$? = 1
-	node tests/browser/pictures.mjs $(BUILD)/browser $(BUILD)/pictures/index.html $(BUILD)/pictures/compared.html $(BUILD)/pictures/render.png tools/docs/images
+#: make images     the two images that README shows (tools/docs/images)
+images: $(BUILD)/assay $(BUILD)/pathtracer $(BUILD)/browser/package-lock.json
+	$(BUILD)/assay validate -q --out $(BUILD)/images --only 12_point_plane --only 41_cornell --only 42_cornell_glass --only 46_sky --only 95_one_bounce_less
+	$(BUILD)/pathtracer -q -r 360x360 -s 1024 -f $(BUILD)/images/render.png reference/scenes/42_cornell_glass.dae
+	$(BUILD)/pathtracer -q -s 64 -r 240x180 --seed 1 -f $(BUILD)/images/1.exr reference/scenes/41_cornell.dae
+	$(BUILD)/pathtracer -q -s 64 -r 240x180 --seed 2 -m 2 -f $(BUILD)/images/2.exr reference/scenes/41_cornell.dae
+	$(BUILD)/assay compare -q --margin 0.01 --report $(BUILD)/images/compared.html $(BUILD)/images/1.exr $(BUILD)/images/2.exr || test $$? = 1
+	node tests/browser/page_images.mjs $(BUILD)/browser $(BUILD)/images/index.html $(BUILD)/images/compared.html $(BUILD)/images/render.png tools/docs/images
 
 # For tests/mutants.
 print-compile:
@@ -275,4 +275,4 @@ print-kernels:
 	@$(foreach k,$(BY_ISA),$(foreach i,$(call isas_of,$(k)),echo $(k)_$(i).c $(k).c $(call isa_flags,$(i),$(k));))
 
 .PHONY: check lint order collada-cts blender-scenes threads tsan faults pairs slurm distros scale-live large scale coverage fuzz mutants machine-mutants catalogue diagnose-rates calibrate anchors \
-  bench bench-rays bvh-table rubric-bugs writeup pictures print-compile print-sanitize print-sanitized print-libs print-kernels programs-san programs-clang programs-fuzz programs-no-memory
+  bench bench-rays bvh-table rubric-bugs writeup images print-compile print-sanitize print-sanitized print-libs print-kernels programs-san programs-clang programs-fuzz programs-no-memory

@@ -33,7 +33,7 @@ static bool make_one(void *ctx, const struct suite_scene *scene, const struct su
     return ok;
 }
 
-/* --pictures wants one reference. */
+/* --images wants one reference. */
 struct chosen {
     const struct suite_scene *scene;
     const struct suite_reference *ref;
@@ -44,7 +44,7 @@ static bool choose(void *ctx, const struct suite_scene *scene, const struct suit
 {
     struct chosen *c = ctx;
     if (c->ref != NULL)
-        return err_set(e, "--pictures is of one reference: give --only and --engine");
+        return err_set(e, "--images is of one reference: give --only and --engine");
     *c = (struct chosen){scene, ref};
     return true;
 }

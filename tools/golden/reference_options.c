@@ -29,7 +29,7 @@ static const struct cli_option options[] = {
     {'o', "out", "DIR", "where they go (build/golden-candidate)", TO(out)},
     {0, "golden", "DIR", "leave out what is stored there and up to date", TO(golden)},
     {0, "fresh", "", "render also what is there and up to date", TO(fresh)},
-    {0, "pictures", "A:B",
+    {0, "images", "A:B",
      "of one reference, images A to B-1 alone, unfolded, into DIR: of\n"
      "Cycles its replicates, of POV-Ray 32 windows without noise, then\n"
      "its replicates; what a job of assay plan does",
@@ -93,15 +93,15 @@ bool reference_options_read(int argc, char **argv, struct reference_command *c, 
     if (c->as != NULL && !file)
         return err_set(e, "--as is for --engine FILE.json");
     if (file && (c->noise || c->last > 0 || c->slurm))
-        return err_set(e, "--engine FILE.json goes with none of --noise, --pictures, --slurm");
+        return err_set(e, "--engine FILE.json goes with none of --noise, --images, --slurm");
     if (file && !engine_load(c->engine, &c->described, e))
         return false;
     if (c->engine != NULL && engine_with_goldens(c->engine) == NULL && !ours && !file)
         return err_set(e, "--engine: '%s' is none of" ENGINES_WITH_GOLDENS(ENGINE_TEXT), c->engine);
     if (c->noise && (c->last > 0 || c->slurm))
-        return err_set(e, "--noise goes with neither --pictures nor --slurm");
+        return err_set(e, "--noise goes with neither --images nor --slurm");
     if (c->last > 0 && (c->slurm || c->fresh || c->golden != NULL))
-        return err_set(e, "--pictures goes with none of --slurm, --fresh, --golden");
+        return err_set(e, "--images goes with none of --slurm, --fresh, --golden");
     if (c->opt.threads == 0)
         c->opt.threads = cli_processors();
     c->opt.seed = c->seed < 0 ? 1 : (uint32_t)c->seed;

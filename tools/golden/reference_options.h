@@ -15,7 +15,7 @@ struct reference_command {
     int num_only;
     struct reference_options opt;
     int seed;        /* negative: none was given */
-    int first, last; /* --pictures; last 0: all */
+    int first, last; /* --images; last 0: all */
     bool fresh, noise, slurm, help;
     struct suite suite;
 };

@@ -115,7 +115,7 @@ static bool plan_one(struct plan *p, const struct wanted *w, int jobs, const cha
     const struct path json = fs_path("%.*s.json", (int)(strlen(s->dae) - strlen(".dae")), s->dae);
     snprintf(seed, sizeof seed, "%u", (unsigned)w->state.opt.seed);
     const char *const word[] = {"--only", s->name, "--engine",   w->ref->engine,
-                                "--seed", seed,    "--pictures", range};
+                                "--seed", seed,    "--images", range};
     const char *const input[] = {s->dae, json.s, s->environment[0] != '\0' ? s->environment : NULL,
                                  NULL};
     json_t *entry = json_pack("{ss, ss, sI, ss, ss, si, si}", "scene", s->name, "engine",
@@ -145,7 +145,7 @@ static bool plan_jobs(struct planning *g, int argc, char **argv, int parts, stru
     const char *binary[NUM_ENGINES_WITH_GOLDENS] = {NULL};
     int threads = cli_rewrite_has_word(argc, argv, "-t", "--threads") ? c->opt.threads : 1;
     if (c->last > 0)
-        return err_set(e, "--pictures: these are a job already");
+        return err_set(e, "--images: these are a job already");
     bool ok = plan_begin(p, c->out, "part.json", threads, e) &&
               reference_options_each(c, look_at_one, g, e) && add_words(p, argc, argv, threads, e);
     for (int k = 0; ok && k < NUM_ENGINES_WITH_GOLDENS; k++)

@@ -116,8 +116,8 @@ plan=$tmp/povray
 two=$(artefact 2)
 cp "$two/picture_0034.exr" "$two/picture_0035.exr" && sign "$two"
 expect "a replicate of POV-Ray twice" 3 "POV-Ray: replicates 2 and 3 are the same" "$san_assay" gather "$plan"
-expect "images that there are not" 3 "no images 35:37 among its 36" "$san_assay" "${words[@]}" --engine povray --pictures 35:37 --out "$tmp/p"
-expect "no range" 3 "'7' is not a range A:B" "$assay" "${words[@]}" --pictures 7
-expect "images of two references" 3 "is of one reference" "$assay" "${words[@]}" --pictures 0:1 --out "$tmp/p"
-expect "images planned" 3 "these are a job already" "$assay" plan --plan "$tmp/p1" "${words[@]}" --engine cycles --pictures 0:1
+expect "images that there are not" 3 "no images 35:37 among its 36" "$san_assay" "${words[@]}" --engine povray --images 35:37 --out "$tmp/p"
+expect "no range" 3 "'7' is not a range A:B" "$assay" "${words[@]}" --images 7
+expect "images of two references" 3 "is of one reference" "$assay" "${words[@]}" --images 0:1 --out "$tmp/p"
+expect "images planned" 3 "these are a job already" "$assay" plan --plan "$tmp/p1" "${words[@]}" --engine cycles --images 0:1
 [ $failures -eq 0 ]

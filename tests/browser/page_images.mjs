@@ -1,4 +1,4 @@
-// node pictures.mjs MODULES PAGE COMPARED RENDER.png OUT: the images that pages show: OUT/report.jpg, the first screen of PAGE,
+// node page_images.mjs MODULES PAGE COMPARED RENDER.png OUT: the images that pages show: OUT/report.jpg, the first screen of PAGE,
 // OUT/difference.jpg, the map of COMPARED, and OUT/render.jpg.
 import { createRequire } from "node:module";
 import { resolve } from "node:path";
