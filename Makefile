@@ -231,4 +231,7 @@ $(BUILD)/deps-live: | $(BUILD)/deps
 .PHONY: all validate golden results report autograder library deb deps deps-live install format clean help FORCE
 .SECONDARY:
 .DELETE_ON_ERROR:
+# What only prints does without: it takes a second to read them.
+ifneq ($(filter-out print-%,$(or $(MAKECMDGOALS),all)),)
 -include $(shell find $(BUILD) -name '*.d' 2>/dev/null)
+endif

@@ -620,7 +620,7 @@ filtered() { # FILTER
              "{height}", "-t", "{threads}", "--filter", "$1", "-f", "{out}"],
  "environment_args": ["-e", "{environment}"], "filter": "gauss:0.5:2", "shared_samples": false}
 END
-    "$san_assay" validate -q --only 34_sky_constant/filtered:truth --engine "$tmp/filtered.json" -o "$tmp/filtered"
+    "$assay" validate -q --only 34_sky_constant/filtered:truth --engine "$tmp/filtered.json" -o "$tmp/filtered"
 }
 expect "a pixel filter that is declared is that of both sides" 0 "^filtered has the pixel filter gauss:0.5:2, .*left out.* cycles in" filtered gauss:0.5:2
 expect "a wider filter than is declared is found" 1 "34_sky_constant  *filtered  *truth .* DIFFERENT" filtered gauss:0.6:2.4

@@ -11,8 +11,25 @@ failures=0 what="own suite"
 
 make -s install BUILD="$build" PREFIX="$tmp/usr" >"$tmp/install.log" 2>&1
 tell "it installs" "$([ -x "$tmp/usr/bin/assay" ] || tail -n 3 "$tmp/install.log")"
-export PATH=$tmp/usr/bin:/usr/bin:$PATH
-mkdir "$tmp/walk" "$tmp/free"
+export PATH=$tmp/once:$tmp/usr/bin:/usr/bin:$PATH
+mkdir "$tmp/walk" "$tmp/free" "$tmp/once" "$tmp/rendered"
+# once OUT PROGRAM ARGUMENT...: renders OUT, unless the same command has on the same contents of files; then it is a copy of that.
+cat >"$tmp/once/once" <<END
+#!/bin/bash
+out=\$1
+shift
+key=$tmp/rendered/\$(for word in "\${@:2}"; do
+    [ "\$word" = "\$out" ] || cat "\$word" 2>/dev/null || echo "\$word"
+done | cat - <(echo "\$1") | md5sum | cut -c 1-32)
+if [ ! -f "\$key" ]; then
+    "\$@" || exit
+    cp "\$out" "\$key.\$\$" && mv "\$key.\$\$" "\$key"
+fi
+cp "\$key" "\$out"
+END
+# tracer.py of the guide.
+printf '#!/bin/bash\n[[ $1 == */tracer.py ]] && exec once "$7" /usr/bin/python3 "$@"\nexec /usr/bin/python3 "$@"\n' >"$tmp/once/python3"
+chmod +x "$tmp/once"/*
 cd "$tmp/free" || exit 1
 
 # A folder that works, wherever one stands.
@@ -105,6 +122,7 @@ tell "the page says so" "$(grep -q 'mine declares margins of its own, 30 % of an
 cp -r begun quiet
 echo '{"name": "mine", "format": "file", "output": "noisy", "spp": 1024, "command": ["./mine.sh", "{scene}", "{width}", "{height}", "{spp}", "{depth}", "1", "{out}"]}' >quiet/mine.json
 sed -i 's/0.01/0.03/; s/"mine-1.0": {}/"mine-2.0": {}/; s/"width": 64, "height": 64/"width": 192, "height": 192/' quiet/suite.json
+sed -i 's/^exec pathtracer/exec once "$7" pathtracer/' quiet/mine.sh
 expect "a noisy image is stored" 0 "mine-2.0.exr: 192 x 192 pixels, 3 x picture" env -C quiet assay golden render --engine mine.json --as mine-2.0
 expect "and approved" 0 "1 approved" env -C quiet assay golden approve --new cornell/mine-2.0
 expect "without seeds: the bits of its former release" 0 "all as it should be, 1 the same" env -C quiet assay validate -q
@@ -121,19 +139,6 @@ fi
 # The guide: indented lines, but what programs print.
 cd "$tmp/walk" || exit 1
 cp "$top/tests/end_to_end/tracer.py" .
-# What the same tracer.py has rendered with the same arguments is not rendered again.
-mkdir "$tmp/rendered"
-cat >"$tmp/usr/bin/python3" <<END
-#!/bin/bash
-[[ \$1 == */tracer.py ]] || exec /usr/bin/python3 "\$@"
-key=$tmp/rendered/\$(cat "\$1" "\$2" - <<<"\${*:2:5}" | md5sum | cut -c 1-32)
-if [ ! -f "\$key" ]; then
-    /usr/bin/python3 "\$@" || exit
-    cp "\$7" "\$key.\$\$" && mv "\$key.\$\$" "\$key"
-fi
-cp "\$key" "\$7"
-END
-chmod +x "$tmp/usr/bin/python3"
 echo '{"floor": [0.5, 0.5, 0.5], "lamp": {"height": 3, "size": 1, "radiance": 20}, "balls": [{"at": [0, 0.5, 0], "radius": 0.5, "albedo": [0.7, 0.3, 0.2]}]}' >ball.json
 echo '{"floor": [0.6, 0.6, 0.6], "lamp": {"height": 3, "size": 2, "radiance": 5}, "balls": [{"at": [-0.6, 0.5, 0], "radius": 0.5, "albedo": [0.2, 0.6, 0.3]}, {"at": [0.5, 0.4, 0.4], "radius": 0.4, "albedo": [0.8, 0.8, 0.8]}]}' >two.json
 guide() { sed -n 's/^    //p' "$top/tools/docs/guide-own-suite.md" | grep -v '^result:'; }
