@@ -264,27 +264,27 @@ static double share_off(const struct cells *s)
 static bool judge(const struct carry *w, const struct rubric_check *c, int bugs, struct result *out,
                   bool *is_judged, struct err *e)
 {
-    struct cells *cells = calloc(1, sizeof *cells);
-    bool ok = cells != NULL || err_set(e, "out of memory");
-    *is_judged = c->kind == CHECK_EQUAL || c->kind == CHECK_AGREE || c->kind == CHECK_SUM ||
-                 c->kind == CHECK_EXACT || c->kind == CHECK_RATES || c->kind == CHECK_GROWTH;
     const int images = c->kind == CHECK_GROWTH ? 1 : c->num_images;
+    *is_judged = c->kind != CHECK_NOISE;
     for (int k = 0; k < images; k++)
         *is_judged = *is_judged && rubric_bugs_can_observe(w->g, w->with, c->images[k]);
-    if (ok && *is_judged && c->kind == CHECK_RATES) {
-        free(cells);
+    if (!*is_judged)
+        return true;
+    if (c->kind == CHECK_RATES) {
         grade_checks_rates(w->g, w->with, c, out);
         return true;
     }
-    for (int k = 0; ok && *is_judged && k < images; k++)
+    struct cells *cells = calloc(1, sizeof *cells);
+    bool ok = cells != NULL || err_set(e, "out of memory");
+    for (int k = 0; ok && k < images; k++)
         ok = add_image(w, c->images[k], k == 0 ? 1 : -1, bugs, cells, e);
-    if (ok && *is_judged && c->kind == CHECK_EXACT) {
+    if (ok && c->kind == CHECK_EXACT) {
         double off = share_off(cells);
         const struct interval i = {off, off, off, 0};
         out->share = score_share(&c->share, &i);
         out->chance = 0;
         snprintf(out->seen, sizeof out->seen, "%.2f %% of the cells differ", 100 * off);
-    } else if (ok && *is_judged) {
+    } else if (ok) {
         ok = measure(cells, w->g->alpha, &out->agreement, e);
         if (ok)
             score(c, out);

@@ -116,8 +116,6 @@ static void row(FILE *f, const json_t *g, size_t parts)
     char text[2048];
     const char *accepted = member_or_empty(g, "accepted");
     bool needs = grade_needs(g, text, sizeof text);
-    size_t k;
-    json_t *p;
     fprintf(f, "<tr%s><th scope=\"row\">", needs ? " class=\"bad\"" : "");
     link_to_staff(f, g);
     fputs("<br><small>", f);
@@ -131,9 +129,9 @@ static void row(FILE *f, const json_t *g, size_t parts)
     fputs("</td><td class=\"needs\">", f);
     bugs_of(f, g);
     fputs("</td>", f);
-    json_array_foreach(json_object_get(g, "parts"), k, p)
+    json_each(p, json_object_get(g, "parts"))
         fprintf(f, "<td class=\"num\">%.2f</td>", member_number(p, "points"));
-    for (k = json_array_size(json_object_get(g, "parts")); k < parts; k++)
+    for (size_t k = json_array_size(json_object_get(g, "parts")); k < parts; k++)
         fputs("<td></td>", f);
     fputs("</tr>\n", f);
 }
@@ -204,9 +202,8 @@ static size_t count_one(struct tally *t, size_t num, const char *text)
 
 static void common_bugs(FILE *f, const json_t *grades, struct tally *t)
 {
-    size_t i, num = 0;
-    json_t *g;
-    json_array_foreach(grades, i, g) {
+    size_t num = 0;
+    json_each(g, grades) {
         const json_t *first =
             json_array_get(json_object_get(json_object_get(g, "diagnosis"), "named"), 0);
         if (first != NULL)
@@ -216,21 +213,20 @@ static void common_bugs(FILE *f, const json_t *grades, struct tally *t)
         return;
     qsort(t, num, sizeof *t, by_num);
     fputs("<h2>Most common bugs</h2><table>\n", f);
-    for (i = 0; i < num && i < 10; i++)
+    for (size_t i = 0; i < num && i < 10; i++)
         html_print(f, "<tr><td class=\"num\">%g</td><td>%s</td></tr>\n", t[i].num, t[i].text);
     fputs("</table>\n", f);
 }
 
 static void slowest(FILE *f, const json_t *grades, struct tally *t)
 {
-    size_t i, num = 0;
-    json_t *g;
-    json_array_foreach(grades, i, g)
+    size_t num = 0;
+    json_each(g, grades)
         t[num++] =
             (struct tally){.text = member_or_empty(g, "id"), .num = member_number(g, "cpu_s")};
     qsort(t, num, sizeof *t, by_num);
     fputs("<h2>Slowest</h2><table>\n", f);
-    for (i = 0; i < num && i < SLOWEST; i++)
+    for (size_t i = 0; i < num && i < SLOWEST; i++)
         html_print(f, "<tr><td class=\"num\">%.1f s</td><td>%s</td></tr>\n", t[i].num, t[i].text);
     fputs("</table>\n", f);
 }
@@ -343,15 +339,15 @@ static void show_same_noise(FILE *f, const json_t *grades, int *group)
 
 bool class_page(FILE *f, const json_t *grades, struct err *e)
 {
-    size_t num = json_array_size(grades), i;
-    json_t *g, **sorted = calloc(num + 1, sizeof(json_t *));
+    size_t num = json_array_size(grades);
+    json_t **sorted = calloc(num + 1, sizeof(json_t *));
     struct tally *t = calloc(num + 1, sizeof *t);
     int *group = calloc(num + 1, sizeof *group);
     bool ok = (sorted != NULL && t != NULL && group != NULL) ||
               err_set(e, "out of memory for the page of the class");
     if (ok) {
-        json_array_foreach(grades, i, g)
-            sorted[i] = g;
+        for (size_t i = 0; i < num; i++)
+            sorted[i] = json_array_get(grades, i);
         qsort(sorted, num, sizeof(json_t *), by_urgency);
         html_page_open(f, "Grades", NULL, 0);
         html_print(f, "<div class=\"grade\">\n<h1>%s</h1>\n",

@@ -69,10 +69,9 @@ static void draw_interval(struct plot *p, const json_t *v, double y)
 void grade_plot_intervals(FILE *f, const json_t *check)
 {
     const json_t *list = json_object_get(check, "intervals");
-    size_t num = json_array_size(list), i;
+    size_t num = json_array_size(list);
     double most = 0;
-    json_t *v;
-    json_array_foreach(list, i, v)
+    json_each(v, list)
         most = fmax(most, 200 * member_number(v, "none"));
     if (num == 0 || !(most > 0))
         return;
@@ -85,8 +84,8 @@ void grade_plot_intervals(FILE *f, const json_t *check)
     p.y.hi = (double)num;
     fputs("<figure class=\"numbers\">", f);
     plot_open(&p, "Differences with their intervals, beside the margins");
-    json_array_foreach(list, i, v)
-        draw_interval(&p, v, (double)(num - 1 - i));
+    for (size_t i = 0; i < num; i++)
+        draw_interval(&p, json_array_get(list, i), (double)(num - 1 - i));
     plot_close(&p);
     fputs("<figcaption>by how much, with the noise of the image: all points while a bar touches "
           "green, none once it has left yellow</figcaption></figure>\n",
