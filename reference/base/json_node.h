@@ -37,8 +37,8 @@ NODISCARD bool json_get_text(const struct json_node *n, const char *key, char *o
 json_t *json_finite(double v);
 json_t *json_interval(double lo, double hi);
 
-/* An array of texts as a command line, after `first` (NULL: nothing), in words that shell_quote_split() reads back: to free(). NULL
- * out of memory. */
+/* An array of texts as a command line, after `first` (NULL: nothing), in words that
+ * shell_quote_split() reads back: to free(). NULL out of memory. */
 NODISCARD char *json_command_line(const char *first, const json_t *words);
 
 /* Two numbers, the lower first? */

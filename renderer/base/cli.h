@@ -1,6 +1,6 @@
-/* Command lines: a table of options that is the --help text and says where each value goes and what it may be, and strict
- * number parsing. Shared by both programs. An option may take several arguments, as the assignment's -r W H does; those of
- * W H may be one word, 480x360. */
+/* Command lines: a table of options that is the --help text and says where each value goes and what
+ * it may be, and strict number parsing. Shared by both programs. An option may take several
+ * arguments, as the assignment's -r W H does; those of W H may be one word, 480x360. */
 #ifndef ASSAY_CLI_H
 #define ASSAY_CLI_H
 
@@ -10,7 +10,8 @@
 #include <stdint.h>
 #include <stdio.h>
 
-/* A number above 0 is times the value of the unit (one character) behind it or, without one, of the last, whose name is NULL. */
+/* A number above 0 is times the value of the unit (one character) behind it or, without one, of the
+ * last, whose name is NULL. */
 struct cli_unit {
     const char *name;
     double value;
@@ -30,8 +31,9 @@ enum cli_kind {
     CLI_REST
 };
 
-/* A row: where the value goes stands in a member of the command's settings, whose type says how it is read. A table ends with
- * a row without a name, which is about the words that are no options: {0} if the command takes none. */
+/* A row: where the value goes stands in a member of the command's settings, whose type says how it
+ * is read. A table ends with a row without a name, which is about the words that are no options:
+ * {0} if the command takes none. */
 struct cli_option {
     char short_name;       /* 0: none */
     const char *long_name; /* without dashes */
@@ -72,8 +74,8 @@ struct cli_option {
 #define CLI_TO_RANGE(type, member) .kind = CLI_RANGE, .to = offsetof(type, member)
 /* Of the last row: the words from the first that is no option on are another command; its index. */
 #define CLI_TO_REST(type, member) .kind = CLI_REST, .to = offsetof(type, member), .stops = true
-/* Reads the words into *settings, which hold the defaults. False with one line on what is no option, no value of it, or one word
- * too many. Text is that of argv. */
+/* Reads the words into *settings, which hold the defaults. False with one line on what is no
+ * option, no value of it, or one word too many. Text is that of argv. */
 NODISCARD bool cli_read(const struct cli_option *options, int argc, char **argv, void *settings,
                         struct err *e);
 
@@ -96,14 +98,16 @@ enum { CLI_END = -1, CLI_POSITIONAL = -2, CLI_ERROR = -3 };
  * argument, and short options without any may stand together, as getopt has it. */
 int cli_next(struct cli *c, struct err *e);
 
-/* The words of a command that parsed, each short option and its argument by itself ("-qj4" as "-q -j 4"), for who stores
- * commands or leaves words out: a NULL-terminated array that points into argv too, to free(). NULL: out of memory. */
+/* The words of a command that parsed, each short option and its argument by itself ("-qj4" as "-q
+ * -j 4"), for who stores commands or leaves words out: a NULL-terminated array that points into
+ * argv too, to free(). NULL: out of memory. */
 NODISCARD char **cli_apart(const struct cli_option *options, int argc, char **argv);
 
 /* Prints the text and then the table in two columns on stdout. */
 void cli_print_help(const char *usage, const struct cli_option *options);
 
-/* The whole of `text` must be a number inside [lo, hi]; `what` names it in the line. A whole one may be written as 1e3. */
+/* The whole of `text` must be a number inside [lo, hi]; `what` names it in the line. A whole one
+ * may be written as 1e3. */
 NODISCARD bool cli_int(const char *what, const char *text, long lo, long hi, int *out,
                        struct err *e);
 NODISCARD bool cli_uint64(const char *what, const char *text, uint64_t *out, struct err *e);
@@ -115,8 +119,9 @@ NODISCARD bool cli_double(const char *what, const char *text, double lo, double 
 NODISCARD bool cli_choice(const char *what, const char *text, const char *const *words, int *out,
                           struct err *e);
 
-/* Of the words that `next` gives for 0, 1, .. until NULL the one that was probably meant: the fewest letters to change, insert,
- * leave out or exchange with their neighbours, at most a third of them; NULL: none. */
+/* Of the words that `next` gives for 0, 1, .. until NULL the one that was probably meant: the
+ * fewest letters to change, insert, leave out or exchange with their neighbours, at most a third of
+ * them; NULL: none. */
 const char *cli_nearest(const char *word, const char *(*next)(const void *list, size_t i),
                         const void *list);
 

@@ -1,8 +1,8 @@
-/* The caller-owned error line.
+/* Errors: one line of text in a struct that the caller owns.
  *
- * Library functions return bool (or NULL) and, on failure only, fill a struct err with one line
- * that says where and what: "scene.dae:123: unknown material tag 'toon'". The line has no newline
- * and no program name; only main() prints it and chooses the exit code. */
+ * Library functions return bool (or NULL). On failure, and only then, they fill a struct err with
+ * one line that says where and what: "scene.dae:123: unexpected <toon> in <technique>". The line
+ * has no newline and no program name; only main() prints it and chooses the exit code. */
 #ifndef ASSAY_ERR_H
 #define ASSAY_ERR_H
 
@@ -12,7 +12,7 @@ struct err {
     char msg[1024];
 };
 
-/* Of a function whose answer has to be looked at. */
+/* For a function whose return value must not be ignored. */
 #define NODISCARD __attribute__((warn_unused_result))
 
 /* Formats the line into e (truncating quietly at its size; e may be NULL), a '?' for each control character.
@@ -23,8 +23,9 @@ bool err_set(struct err *e, const char *fmt, ...) __attribute__((format(printf, 
  * returns false. */
 bool err_prefix(struct err *e, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
 
-/* Whether the line says that memory ran out, in our words or those of the C library and of OpenEXR: then it tells nothing of the
- * file that was looked at. For those who take a failure for somebody else's fault. */
+/* Whether the line says that memory ran out, in our words or those of the C library and of OpenEXR:
+ * then it tells nothing of the file that was looked at. For those who take a failure for somebody
+ * else's fault. */
 bool err_is_of_memory(const struct err *e);
 
 /* Each control character becomes a '?'. What a file or a library said may end up in a line: a terminal must not obey

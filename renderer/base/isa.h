@@ -8,7 +8,7 @@
 #include <stdbool.h>
 
 enum isa {
-    ISA_SCALAR, /* none: the oracle of the others */
+    ISA_SCALAR, /* none: the reference that the others are tested against */
     ISA_AUTO,   /* as an option only: the widest that the machine has */
     ISA_SSE42,
     ISA_AVX2,  /* with FMA */
@@ -21,9 +21,10 @@ NODISCARD bool isa_choose(enum isa *isa, struct err *e);
 
 extern const char *const isa_names[]; /* by enum isa; ends with NULL */
 
-/* Before a function with loops over many numbers: it is compiled for wider vectors, too, and the machine's choice is made
- * when the program is loaded, which is before sanitizers are ready. The same bits, as the compiler neither contracts nor
- * reorders. */
+/* Put before a function that loops over many numbers. The compiler makes clones for wider vectors, and
+ * the dynamic loader picks one when the program starts; not under sanitizers, which are not ready by
+ * then. All clones give the same bits, as the compiler neither contracts nor reorders floating-point
+ * operations. */
 #if defined __GLIBC__ && !defined __clang__ && !defined __SANITIZE_ADDRESS__ &&                    \
     !defined __SANITIZE_THREAD__
 #define ISA_CLONES __attribute__((target_clones("avx512f", "avx2", "default")))

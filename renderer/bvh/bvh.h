@@ -1,4 +1,4 @@
-/* Which primitive does a ray meet first, and is anything in between: over all primitives of a
+/* Ray queries, the nearest hit and occlusion: over all primitives of a
  * scene, by brute force or by a binary bounding volume hierarchy. Rays come in batches, so that
  * wider kernels can take their place behind the same interface. */
 #ifndef ASSAY_BVH_H

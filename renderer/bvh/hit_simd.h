@@ -1,6 +1,6 @@
-/* Pairs of a ray and a triangle or sphere, one a lane, by the tests of shape.c, operation by operation, so that a hit has
- * the same bits. Whether the lanes are rays or primitives is the caller's matter. Part of traverse.c and
- * small_scene_trace.c. */
+/* Ray-triangle and ray-sphere tests, a pair in each lane, by the tests of shape.c, operation by
+ * operation, so that a hit has the same bits. Whether the lanes are rays or primitives is the
+ * caller's matter. Part of traverse.c and small_scene_trace.c. */
 #ifndef ASSAY_HIT_SIMD_H
 #define ASSAY_HIT_SIMD_H
 

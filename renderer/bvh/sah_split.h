@@ -1,4 +1,4 @@
-/* Where to cut a list of primitives in two: the passes of the builder over all of them, compiled once
+/* Splits by the surface area heuristic, binned [Wald07]: the passes of the builder over all of them, compiled once
  * for each instruction set (isa.h). All give the same bits. */
 #ifndef ASSAY_SAH_SPLIT_H
 #define ASSAY_SAH_SPLIT_H

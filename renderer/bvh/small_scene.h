@@ -1,7 +1,8 @@
-/* A scene of few primitives without a tree, or the few large ones of a scene, in two forms. Exact: corners and edges that triangles share
- * bit for bit are there once, so that each is taken to a ray once. Quick: planes with two coordinates
- * in them, of which two triangles that make a parallelogram are one; they tell which triangle a ray
- * meets unless that is a matter of rounding. */
+/* A list instead of a tree: for scenes of few primitives, and for the few largest primitives of
+ * others. It has two forms. Exact: corners and edges that triangles share bit for bit are stored
+ * once, so that each is transformed into a ray's coordinates once. Quick: planes with two in-plane
+ * coordinates; two triangles that form a parallelogram share one plane. It tells which triangle a
+ * ray hits, unless rounding could change the answer. */
 #ifndef ASSAY_SMALL_SCENE_H
 #define ASSAY_SMALL_SCENE_H
 

@@ -1,4 +1,5 @@
-/* The way of rays through the wide hierarchy, or past a scene that is a list, compiled once for each instruction set (isa.h). */
+/* Traversal of the wide hierarchy, or of a scene that is a list, compiled once for each instruction
+ * set (isa.h). */
 #ifndef ASSAY_TRAVERSE_H
 #define ASSAY_TRAVERSE_H
 

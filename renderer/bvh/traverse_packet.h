@@ -1,5 +1,5 @@
-/* Eight rays together: a leaf's primitives one by one against all of them, and through the tree as one
- * where they are alike. Part of traverse.c. */
+/* Packet traversal, eight rays together: a leaf's primitives one by one against all of them, and
+ * through the tree as one where they are alike. Part of traverse.c. */
 #ifndef ASSAY_TRAVERSE_PACKET_H
 #define ASSAY_TRAVERSE_PACKET_H
 

@@ -1,4 +1,4 @@
-/* One ray through the tree: against eight boxes of a node, then against eight primitives of a leaf at a
+/* Single-ray traversal: one ray against eight boxes of a node, then against eight primitives of a leaf at a
  * time. Part of traverse.c. */
 #ifndef ASSAY_TRAVERSE_SINGLE_H
 #define ASSAY_TRAVERSE_SINGLE_H
@@ -132,8 +132,8 @@ INLINE void single_root(const struct wide *w, struct single *s)
     s->hit = single_node((const struct wide_node *)w->arena, &b, vf_set(s->limit), &s->enter);
 }
 
-/* From *ref down to a leaf, always to the nearest child; what is left goes onto the stack. False: the ray meets no child
- * of a node. */
+/* From *ref down to a leaf, always to the nearest child; what is left goes onto the stack. False:
+ * the ray meets no child of a node. */
 INLINE bool single_descend(const struct wide *w, const struct slabs *b, vf limit, uint32_t *ref,
                            stacked **top, uint64_t *nodes)
 {

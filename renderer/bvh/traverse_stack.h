@@ -1,5 +1,5 @@
-/* Nodes and leaves that wait while a ray, or a packet of them, is elsewhere in the tree: the nearest
- * child is visited at once, the others are pushed in order. Part of traverse.c. */
+/* The traversal stack: nodes and leaves that a ray, or a packet of rays, still has to visit. The
+ * nearest child is visited at once, the others are pushed in order of distance. Part of traverse.c. */
 #ifndef ASSAY_TRAVERSE_STACK_H
 #define ASSAY_TRAVERSE_STACK_H
 

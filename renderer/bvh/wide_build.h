@@ -6,16 +6,18 @@
 #include "bvh_wide.h"
 #include "sah_split.h"
 
-/* Items [first, first + count), and what was cut on the way here. */
+/* Items [first, first + count), and how many cuts led here. */
 struct wide_range {
     uint32_t first, count;
     int depth; /* cuts */
     struct wide_box box, centres;
 };
 
-/* cost[i]: expected tests of the best wide tree of this part that hangs on at most i + 1 children of
- * the node above, each times the half area of its box; left_slots[i]: how many of these go to the left
- * half, 0: all of it is one child; left_slots[0]: if it is a node, how many of its eight. */
+/* A subtree of the binary tree, with the table of the dynamic programme that makes the wide tree
+ * [Ylitie17]. cost[i]: the least expected number of tests, each weighted with half the area of its
+ * box, if the subtree may use at most i + 1 child slots of the node above. left_slots[i]: how many
+ * of these slots go to its left half; 0: it takes one slot as a whole. left_slots[0]: if it becomes
+ * a node, how many of that node's eight slots go to the left half. */
 struct wide_part {
     struct wide_box box;
     uint32_t first, count;

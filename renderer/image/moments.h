@@ -1,7 +1,6 @@
-/* Per pixel and channel moments over independent observations, the currency of the project: n,
- * mean, M2 = sum (x-mean)^2 and M3 = sum (x-mean)^3, in double, mergeable [Pebay08]. An observation
- * is a sample (of our renderer) or a replicate (a whole image of an engine, with a seed of its
- * own). */
+/* Per pixel and channel: n, mean, M2 = sum (x-mean)^2 and M3 = sum (x-mean)^3 over independent observations, in double;
+ * two sets can be merged [Pebay08]. All comparisons work on these. An observation is a sample (of our renderer) or a
+ * replicate (a whole image of an engine, with a seed of its own). */
 #ifndef ASSAY_MOMENTS_H
 #define ASSAY_MOMENTS_H
 
@@ -62,7 +61,8 @@ void moments_add_image(struct moments *m, const float *pixels_rgb);
 /* dst += src, as if all observations had been added to one [Pebay08 eq. 2.1]. Same sizes, or fails
  * (as it does on different units or spp). */
 NODISCARD bool moments_merge(struct moments *dst, const struct moments *src, struct err *e);
-/* Pixels first .. first+num-1 in the order of their rows, as an image one pixel high for moments_merge(). Owns nothing. */
+/* Pixels first .. first+num-1 in the order of their rows, as an image one pixel high for
+ * moments_merge(). Owns nothing. */
 struct moments moments_run(const struct moments *m, size_t first, int num);
 /* Rows y .. y+num-1. Owns nothing. */
 struct moments moments_rows(const struct moments *m, int y, int num);
@@ -78,8 +78,8 @@ NODISCARD bool moments_write(const char *path, const struct moments *m,
 NODISCARD bool moments_write_layers(const char *path, const struct moments *m,
                                     const struct image *layers, const struct image_attr *attrs,
                                     int num_attrs, struct err *e);
-/* The same for an image that is never in memory as a whole: moments of whole rows come from the top, IMAGE_BAND rows or a
- * multiple of that at a time and the rest last. */
+/* The same for an image that is never in memory as a whole: moments of whole rows come from the
+ * top, IMAGE_BAND rows or a multiple of that at a time and the rest last. */
 struct moments_writer;
 /* first: has width, unit and spp of all; layers: has their names. NULL with a line on failure. */
 NODISCARD struct moments_writer *moments_writer_open(const char *path, const struct moments *first,

@@ -1,5 +1,5 @@
-/* Batches of paths as structures of arrays: one lane is one path. The stages of the integrator
- * (generate, intersect, shade, connect) each run over a list of lanes. */
+/* Batches of paths in structure-of-arrays layout; one lane holds one path. The stages of the integrator (generate,
+ * intersect, shade, connect, scatter) each run over a list of lanes. */
 #ifndef ASSAY_RAY_BATCH_H
 #define ASSAY_RAY_BATCH_H
 

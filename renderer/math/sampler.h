@@ -1,5 +1,6 @@
-/* Random numbers as a function: the value depends on (seed, pixel, sample, vertex, purpose) and on
- * nothing else, so threads, tiles and order of work cannot matter. Two functions of that kind:
+/* Random numbers (samplers) as a function: the value depends on (seed, pixel, sample, vertex,
+ * purpose) and on nothing else, so threads, tiles and order of work cannot matter. Two functions of
+ * that kind:
  *
  * Independent: the counter-based generator Philox4x32-10 [Salmon11]; the four indices are its
  * counter, the seed its key.
@@ -7,9 +8,10 @@
  * Sobol: for each (pixel, vertex, purpose) the samples 0, 1, 2, ... are points of one digital
  * sequence in 4 dimensions, scrambled as a nested uniform scrambling would [Owen95] by a hash
  * [Burley20]; scrambles and order of the points are chosen by hashes of the pixel under keys that
- * Philox makes of (seed, vertex, purpose), so blocks are padded and pixels are decorrelated. Each number is uniform, but the
- * samples of one pixel depend on each other: their spread is no measure of the error of their mean.
- * What is promised of samples k 2^m .. (k+1) 2^m - 1 of a block, for every k:
+ * Philox makes of (seed, vertex, purpose), so blocks are padded and pixels are decorrelated. Each
+ * number is uniform, but the samples of one pixel depend on each other: their spread is no measure
+ * of the error of their mean. What is promised of samples k 2^m .. (k+1) 2^m - 1 of a block, for
+ * every k:
  * - u[0..1] and u[2..3] are (0,m,2)-nets in base 2: one point in each box of area 2^-m;
  * - u[0..3] is a (0,m/2,4)-net in base 4 if m is even: one point in each box of volume 2^-m whose
  *   sides are powers of 1/4. */

@@ -1,5 +1,5 @@
-/* Maps of [0,1)^2 onto directions and surfaces, each beside its density: pdf_w per steradian, pdf_a
- * per unit area. Local frames have the normal on +Z. */
+/* Sampling of simple densities: maps of [0,1)^2 onto directions and surfaces, each beside its
+ * density: pdf_w per steradian, pdf_a per unit area. Local frames have the normal on +Z. */
 #ifndef ASSAY_WARP_H
 #define ASSAY_WARP_H
 

@@ -131,8 +131,8 @@ static void build_regions(const struct environment *env, dvec3 n, const struct r
     discrete_build(rows, env->num_rows, end);
 }
 
-/* Middle and angle of region (i, j), the sum over whose rows of luminance times direction is `towards`. Of a region of no more
- * than a quarter turn the corners are furthest. */
+/* Middle and angle of region (i, j), the sum over whose rows of luminance times direction is
+ * `towards`. Of a region of no more than a quarter turn the corners are furthest. */
 static void bound_region(const struct environment *env, uint32_t i, uint32_t j, dvec3 towards,
                          struct region *region)
 {

@@ -1,14 +1,16 @@
-/* Light from infinitely far away, of every direction: a constant, or an image in latitude and
- * longitude. The image lies as in the assignment: theta = acos(y) from the top row to the bottom
- * row, phi = atan2(-z, x) + pi from the left column to the right one; so -X is the left and right
- * edge, +Z a quarter from the left, +X the middle, -Z a quarter from the right.
+/* Environment light, from infinitely far away: a constant, or an image in latitude and longitude.
+ * The image lies as in the assignment: theta = acos(y) from the top row to the bottom row, phi =
+ * atan2(-z, x) + pi from the left column to the right one; so -X is the left and right edge, +Z a
+ * quarter from the left, +X the middle, -Z a quarter from the right.
  *
  * Radiance is interpolated between the centres of texels, around the circle of longitude and
  * constant beyond the centres of the first and last row, so that a coarse map shows no squares to a
- * camera or in a mirror. Directions are chosen for a surface: first a region of up to 16 x 32, by its luminance times solid
- * angle times about its cosine with the surface's normal, which is rounded; in it a cell that the centres of texels span, by
- * the mean luminance of the cell's corners times its solid angle; then uniformly in solid angle within the cell. That density
- * is exact, and positive wherever light comes to that side. Of a constant, directions are chosen by the cosine. */
+ * camera or in a mirror. Directions are chosen for a surface: first a region of up to 16 x 32, by
+ * its luminance times solid angle times about its cosine with the surface's normal, which is
+ * rounded; in it a cell that the centres of texels span, by the mean luminance of the cell's
+ * corners times its solid angle; then uniformly in solid angle within the cell. That density is
+ * exact, and positive wherever light comes to that side. Of a constant, directions are chosen by
+ * the cosine. */
 #ifndef ASSAY_ENVIRONMENT_H
 #define ASSAY_ENVIRONMENT_H
 

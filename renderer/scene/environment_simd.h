@@ -1,4 +1,4 @@
-/* Looking up an environment, and choosing directions of it, in lanes. */
+/* Environment light by lanes: look-up, sampling of directions, density. */
 #ifndef ASSAY_ENVIRONMENT_SIMD_H
 #define ASSAY_ENVIRONMENT_SIMD_H
 
@@ -7,8 +7,8 @@
 #include "renderer/math/warp.h"
 
 enum {
-    /* At most so many regions of cells, for whose choice there is a table for each of the normals rounded to multiples of
-     * 1/NORMAL_STEPS. */
+    /* At most so many regions of cells, for whose choice there is a table for each of the normals
+     * rounded to multiples of 1/NORMAL_STEPS. */
     REGION_ROWS = 16,
     REGION_COLUMNS = 32,
     NORMAL_STEPS = 3,
@@ -19,12 +19,13 @@ struct environment {
     enum environment_kind kind;
     rgb radiance; /* not image */
     double total;
-    /* Image. Cells are `width` columns, of which column c lies between the centres of texels c-1 and c, and height+1 rows,
-     * of which the first and the last are half as high. */
+    /* Image. Cells are `width` columns, of which column c lies between the centres of texels c-1
+     * and c, and height+1 rows, of which the first and the last are half as high. */
     uint32_t width, height;
     rgb *texel;
-    /* By row of cells: sin^2(theta/2) where it begins, which is proportional to the solid angle from the nearer pole and exact
-     * near it, and what it grows by, with theta from the top in the upper half, from the bottom below it. */
+    /* By row of cells: sin^2(theta/2) where it begins, which is proportional to the solid angle
+     * from the nearer pole and exact near it, and what it grows by, with theta from the top in the
+     * upper half, from the bottom below it. */
     float *begin, *growth;
     uint32_t num_rows, num_columns;      /* of regions */
     uint8_t *region_row, *region_column; /* by row and by column of cells */
@@ -134,7 +135,8 @@ static inline void pick_each(struct picks *p, int num, const float *u)
         }
 }
 
-/* Choices of cells for the lanes of the mask; where in them, 0 to 1, and the density: 0, if no light comes to that side. */
+/* Choices of cells for the lanes of the mask; where in them, 0 to 1, and the density: 0, if no
+ * light comes to that side. */
 static inline void pick_cells(const struct environment *env, const int32_t table[LANES],
                               const vf u[4], unsigned mask, int32_t row[LANES],
                               int32_t column[LANES], float part[2][LANES], float pdf_w[LANES])
@@ -211,7 +213,8 @@ INLINE void sample_sky(const struct environment *env, vec3v n, const vf u[4], un
     *pdf_w = vf_load_any(pdf);
 }
 
-/* Density of a choice by the cosine with n alone, of the upper half of what is up and of the mirror images of what is down. */
+/* Density of a choice by the cosine with n alone, of the upper half of what is up and of the mirror
+ * images of what is down. */
 INLINE vf even_sky_pdf_w(const struct environment *env, vec3v n, vec3v w)
 {
     const vf zero = vf_set(0);
@@ -238,7 +241,8 @@ INLINE void sample_environment_from(const struct environment *env, vec3v n, cons
     *pdf_w = even_sky_pdf_w(env, n, *wi);
 }
 
-/* Radiance from the unit directions of the mask; and the density with which they are chosen at normals n, unless n is NULL. */
+/* Radiance from the unit directions of the mask; and the density with which they are chosen at
+ * normals n, unless n is NULL. */
 INLINE rgbv look_up_environment(const struct environment *env, const vec3v *n, vec3v w,
                                 unsigned mask, vf *pdf_w)
 {

@@ -1,4 +1,4 @@
-/* How a pixel weighs the light around its centre: the image's value is the integral of radiance times f(x) f(y),
+/* Pixel reconstruction filters: the image's value is the integral of radiance times f(x) f(y),
  * x and y in pixels from the centre. */
 #ifndef ASSAY_PIXEL_FILTER_H
 #define ASSAY_PIXEL_FILTER_H
@@ -7,7 +7,8 @@
 
 enum {
     PIXEL_FILTER_TEXT = 64,
-    /* Of the table: shares of one side from 2^-25 to 1/2 are cut into bins by their exponent and so many bits behind it. */
+    /* Of the table: shares of one side from 2^-25 to 1/2 are cut into bins by their exponent and so
+     * many bits behind it. */
     PIXEL_FILTER_CUBIC = 4,
     PIXEL_FILTER_BITS = 4,
     PIXEL_FILTER_BINS = 24 << PIXEL_FILTER_BITS,
@@ -17,8 +18,9 @@ enum {
 
 enum pixel_filter_kind { PIXEL_FILTER_BOX, PIXEL_FILTER_TENT, PIXEL_FILTER_GAUSS };
 
-/* f is 0 beyond the radius, and else proportional to 1 (box), 1 - |x|/radius (tent), exp(-x^2/(2 sigma^2)) less its value
- * at the radius (Gauss, as pbrt and Mitsuba have it). All zero is the box of one pixel. */
+/* f is 0 beyond the radius, and else proportional to 1 (box), 1 - |x|/radius (tent), exp(-x^2/(2
+ * sigma^2)) less its value at the radius (Gauss, as pbrt and Mitsuba have it). All zero is the box
+ * of one pixel. */
 struct pixel_filter {
     enum pixel_filter_kind kind;
     double radius, sigma; /* pixels; radius 0: the box of one pixel */
@@ -30,8 +32,8 @@ struct pixel_filter {
 
 extern const char *const pixel_filter_names[]; /* by enum pixel_filter_kind; end with NULL */
 
-/* Radius from 0.5, as less would leave light between the pixels out, to 16; sigma, of Gauss alone, from 0.05 to 8. Fails on
- * any other. */
+/* Radius from 0.5, as less would leave light between the pixels out, to 16; sigma, of Gauss alone,
+ * from 0.05 to 8. Fails on any other. */
 NODISCARD bool pixel_filter_make(struct pixel_filter *f, enum pixel_filter_kind kind, double radius,
                                  double sigma, struct err *e);
 /* "box:1", "tent:1", "gauss:SIGMA:RADIUS"; without a radius box:0.5, tent:1, six sigmas of Gauss. */
@@ -44,14 +46,14 @@ bool pixel_filter_is_gauss(const struct pixel_filter *f, double sigmas);
 
 /* f(x), per pixel. */
 double pixel_filter_value(const struct pixel_filter *f, double x);
-/* The point, from the centre, below which the share u in [0,1) of f lies: distributed as f is, so that every sample weighs the
- * same. Not of the box of one pixel. */
+/* The point, from the centre, below which the share u in [0,1) of f lies: distributed as f is, so
+ * that every sample weighs the same. Not of the box of one pixel. */
 float pixel_filter_sample(const struct pixel_filter *f, float u);
 
-/* Where pixels share samples, each of which is counted by all filters that reach it: how many times the sum of the
- * pixels' variances (order 2), or third cumulants (3), the sum over a large square of pixels has, if noise is as large
- * between pixels as on them: with s(x) the sum of all pixels' filters, (integral of f s^(order-1) / integral of f^order)^2. 2.25
- * and 4 for a tent of radius 1. */
+/* Where pixels share samples, each of which is counted by all filters that reach it: how many times
+ * the sum of the pixels' variances (order 2), or third cumulants (3), the sum over a large square
+ * of pixels has, if noise is as large between pixels as on them: with s(x) the sum of all pixels'
+ * filters, (integral of f s^(order-1) / integral of f^order)^2. 2.25 and 4 for a tent of radius 1. */
 double pixel_filter_sharing(const struct pixel_filter *f, int order);
 
 #endif

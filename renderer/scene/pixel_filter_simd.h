@@ -1,4 +1,4 @@
-/* Choosing places by a pixel's filter, in lanes. */
+/* Importance sampling of the pixel filter, by lanes. */
 #ifndef ASSAY_PIXEL_FILTER_SIMD_H
 #define ASSAY_PIXEL_FILTER_SIMD_H
 

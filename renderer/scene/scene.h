@@ -36,7 +36,7 @@ enum material_kind {
     MATERIAL_PLASTIC /* diffuse under a highlight, a rough lobe of one colour at all angles, and a mirror image: their
                             sum, either may be black */
 };
-/* Sets of kinds, of bits 1 << kind: what a kind needs and does, for all who need not know its name. */
+/* Sets of material kinds as bit masks (1 << kind), so that code can ask for a property and need not list kinds. */
 enum {
     NUM_MATERIAL_KINDS = MATERIAL_PLASTIC + 1,
     MATERIAL_REFRACTS = 1 << MATERIAL_REFRACTION | 1 << MATERIAL_GLASS,   /* by ior */
@@ -54,9 +54,10 @@ enum microfacet_kind {
 /* Smoother than this is a mirror: float32 hardly tells the normals apart. */
 #define MICROFACET_MIN_ALPHA 1e-4f
 
-/* Emission and reflection are independent: an emitter may reflect too. A factor that a kind does not
- * have is 0, and only rough conductors are `conductor`. A map is 1 + the number of a texture that the colour is multiplied by at every
- * place, 0 without one; only diffuse reflectance and radiance have one. */
+/* Emission and reflection are independent: an emitter may reflect too. A factor that a kind does
+ * not have is 0, and only rough conductors are `conductor`. A map is 1 + the number of a texture
+ * that the colour is multiplied by at every place, 0 without one; only diffuse reflectance and
+ * radiance have one. */
 struct material {
     char name[64];
     enum material_kind kind;

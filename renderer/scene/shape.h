@@ -1,4 +1,4 @@
-/* Ray against triangle and sphere. */
+/* Ray-triangle and ray-sphere intersection. */
 #ifndef ASSAY_SHAPE_H
 #define ASSAY_SHAPE_H
 
@@ -18,10 +18,11 @@ struct shear {
 
 struct shear shape_shear(const ray *r);
 
-/* [Woop13]. s must be the shear of r, whose tmin and tmax may have changed since. If r meets the triangle inside (tmin, tmax): true, with distance t and barycentric
- * coordinates (u, v) of the second and third vertex. Both sides are hit, and the rim counts. Of
- * triangles that share an edge or a vertex bit for bit and close the space around it at least one is
- * hit: no ray slips through a closed mesh. */
+/* [Woop13]. s must be the shear of r, whose tmin and tmax may have changed since. If r meets the
+ * triangle inside (tmin, tmax): true, with distance t and barycentric coordinates (u, v) of the
+ * second and third vertex. Both sides are hit, and the rim counts. Of triangles that share an edge
+ * or a vertex bit for bit and close the space around it at least one is hit: no ray slips through a
+ * closed mesh. */
 bool triangle_intersect(const struct triangle *tri, const ray *r, const struct shear *s, float *t,
                         float *u, float *v);
 

@@ -1,4 +1,4 @@
-/* Images on surfaces. A texture is an image of linear light, how it goes on beyond its edges, and what is between the
+/* Textures. A texture is an image of linear light, how it goes on beyond its edges, and what is between the
  * centres of its texels.
  *
  * Coordinates are COLLADA's and OpenGL's: (0,0) is the image's lower left corner, (1,1) its upper right one, so the
@@ -29,8 +29,8 @@ struct uv {
 rgb texture_lookup(const struct texture *t, struct uv at);
 /* At barycentric coordinates (b1, b2) of the second and third corner. */
 rgb texture_on_triangle(const struct texture *t, const struct uv corner[3], float b1, float b2);
-/* About the mean luminance of factor times the texture over a triangle: at the centres of as many equal parts as the triangle
- * covers texels, 4096 at most. */
+/* About the mean luminance of factor times the texture over a triangle: at the centres of as many
+ * equal parts as the triangle covers texels, 4096 at most. */
 double texture_mean_luminance(const struct texture *t, const struct uv corner[3], rgb factor);
 /* Of each channel over the whole image. NaN if a number is NaN. */
 rgb texture_max(const struct texture *t);

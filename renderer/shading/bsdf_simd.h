@@ -1,8 +1,9 @@
-/* Scattering at a surface, by lanes, which may be of different materials. Directions are unit, point away from the
- * surface, and stand in the local frame of the shading normal, which is turned to the side of wo: wo.z > 0. wi.z < 0 is
- * light that comes through the surface. f is in sr^-1, without the cosine, and 0 for delta lobes, as is their density.
- * A new material has a header of its own, lines in eval_lobes() and sample_lobes(), and its bit in the sets of kinds that
- * it belongs to (scene.h). */
+/* BSDFs: sampling, evaluation and density, by lanes, which may be of different materials.
+ * Directions are unit, point away from the surface, and stand in the local frame of the shading
+ * normal, which is turned to the side of wo: wo.z > 0. wi.z < 0 is light that comes through the
+ * surface. f is in sr^-1, without the cosine, and 0 for delta lobes, as is their density. A new
+ * material has a header of its own, lines in eval_lobes() and sample_lobes(), and its bit in the
+ * sets of kinds that it belongs to (scene.h); all files: renderer/README.md, "What to touch". */
 #ifndef ASSAY_BSDF_SIMD_H
 #define ASSAY_BSDF_SIMD_H
 
@@ -42,8 +43,8 @@ INLINE void materials_gather(const float *record, const int32_t number[LANES], s
     m->reflectance = rgb_select(has_bits(m->bits, 1 << MATERIAL_PLASTIC), m->eta, m->reflectance);
 }
 
-/* Sampled directions. weight = f |cos(theta_i)| / pdf_w, so the caller multiplies and is done. pdf_w 0: nothing scatters
- * (the path ends). */
+/* Sampled directions. weight = f |cos(theta_i)| / pdf_w, so the caller multiplies and is done.
+ * pdf_w 0: nothing scatters (the path ends). */
 struct bsdf_samplev {
     vec3v wi;
     rgbv weight;

@@ -1,4 +1,4 @@
-/* How much a smooth boundary reflects. */
+/* Fresnel reflectance of smooth boundaries, by lanes. */
 #ifndef ASSAY_FRESNEL_H
 #define ASSAY_FRESNEL_H
 

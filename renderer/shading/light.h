@@ -1,7 +1,12 @@
-/* Choosing a light, sampling it from a point, and the density of doing so. Areas are sampled uniformly (pdf_a
- * = 1/area, turned into pdf_w = pdf_a d^2 / cos_l at the receiver [Veach97 8.2]); a sphere seen
- * from outside, uniformly over the cone it subtends [Shirley96]; of triangles with a texture each in proportion to the
- * mean of the texture over it, and uniformly within, with a tenth of all samples by area alone so that no place is left out. */
+/* Light sampling (next event estimation): choosing a light, sampling a point on it as seen from a
+ * shading point, and the density of both. Triangles are sampled uniformly by area: pdf_a = 1/area,
+ * converted to pdf_w = pdf_a d^2 / cos_l at the receiver [Veach97 8.2]. A sphere seen from outside
+ * is sampled uniformly over the cone that it subtends [Shirley96]. In a textured light a triangle
+ * is chosen in proportion to its area times (0.1 + 0.9 L/mean), L its mean luminance and mean that
+ * of the light, so that no part is left out; within the triangle the sample is uniform.
+ *
+ * A new kind of light: enum light_kind (scene.h), scene.c, light.c, light_simd.h; its reader in
+ * collada_light.c; then the references (reference/README.md, "What to touch"). */
 #ifndef ASSAY_LIGHT_H
 #define ASSAY_LIGHT_H
 
@@ -24,8 +29,9 @@ struct light_choice {
     float probability;
 };
 
-/* One light for the place p with the unit normal n, in proportion to about the irradiance (its luminance) that comes from
- * it (light_choice.h); never one that sends nothing to that side. only_delta: among the delta lights alone. 0 <= u < 1. */
+/* One light for the place p with the unit normal n, in proportion to about the irradiance (its
+ * luminance) that comes from it (light_choice.h); never one that sends nothing to that side.
+ * only_delta: among the delta lights alone. 0 <= u < 1. */
 struct light_choice light_choose(const struct light_table *t, bool only_delta, vec3 p, vec3 n,
                                  float u);
 /* The probability that light_choose(t, false, ..) has for light l there. */
@@ -43,7 +49,8 @@ struct light_sample {
     bool delta;      /* pdf_w is then 1 and no BSDF sample can find the light */
 };
 
-/* One sample of light number l as seen from p, where the unit normal is n: what the environment goes by. u in [0,1)^4. */
+/* One sample of light number l as seen from p, where the unit normal is n: what the environment
+ * goes by. u in [0,1)^4. */
 struct light_sample light_sample_direction(const struct light_table *t, uint32_t l, vec3 p, vec3 n,
                                            const float u[4]);
 

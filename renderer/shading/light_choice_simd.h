@@ -1,4 +1,4 @@
-/* Choosing by light_choice.h, from the places of several lanes. */
+/* Many lights (light_choice.h), by lanes. */
 #ifndef ASSAY_LIGHT_CHOICE_SIMD_H
 #define ASSAY_LIGHT_CHOICE_SIMD_H
 

@@ -1,4 +1,4 @@
-/* Sampling lights, and the density of doing so, from the places of several lanes. */
+/* Light sampling (light.h) by lanes: samples for next event estimation, and their density. */
 #ifndef ASSAY_LIGHT_SIMD_H
 #define ASSAY_LIGHT_SIMD_H
 
@@ -11,8 +11,9 @@
 enum {
     /* Up to so many triangles of a light are looked through one by one. */
     FEW_TRIANGLES = 8,
-    /* Words of the record of a light's triangle: corner, two edges, normal, then the area up to and including it, each triangle's
-     * times its weight, and its weight: 1, or how much more often it is chosen for its texture. */
+    /* Words of the record of a light's triangle: corner, two edges, normal, then the area up to and
+     * including it, each triangle's times its weight, and its weight: 1, or how much more often it
+     * is chosen for its texture. */
     LAMP_AREA = 12,
     LAMP_WEIGHT = 13,
     LAMP_WORDS = 16

@@ -1,6 +1,8 @@
-/* Rough surfaces as many small mirrors: distribution D of their normals m, Smith shadowing, sampling of
- * the normals that are visible from wo [Heitz14]. Local frame, normal on +Z; alpha at least
- * MICROFACET_MIN_ALPHA, directions above the surface by more than 1e-15; kind: of enum microfacet_kind. */
+/* The microfacet model: distribution D of the facet normals m (GGX, Beckmann), Smith's shadowing
+ * and masking, and sampling of the normals that are visible from wo [Heitz14]. Directions are in
+ * the local frame, normal +Z, and more than 1e-15 above the surface; alpha is at least
+ * MICROFACET_MIN_ALPHA; kind is an enum microfacet_kind per lane.
+ * tests/renderer/shading/test_bsdf.c checks it against the textbook formulas in double precision. */
 #ifndef ASSAY_MICROFACET_H
 #define ASSAY_MICROFACET_H
 
@@ -57,9 +59,9 @@ INLINE vf microfacet_starter_lambda(vf alpha, vec3v w)
     return vf_select(vf_lt(vf_set(0), tan2), l, vf_set(0));
 }
 
-/* Both seen from wo and lit from wi: of the whole surface's height at once (correlated), or as if
- * the two were independent (separable, a mask). MICROFACET_BECKMANN_STARTER: of the whole surface, with a pi for the
- * sqrt(pi) of its lambda; more than 1 where the surface is seen and lit from above. */
+/* Smith's G2, the fraction of facets visible from both wo and wi. Height-correlated: 1/(1 + lambda_o + lambda_i).
+ * separable (a mask): the product of the two G1. MICROFACET_BECKMANN_STARTER: height-correlated with the starter code's
+ * lambda, which has pi where sqrt(pi) belongs; that is more than 1 where both directions are near the normal. */
 INLINE vf microfacet_g2(vi kind, vf alpha, vi separable, vec3v wo, vec3v wi)
 {
     vf lo = microfacet_lambda(kind, alpha, wo), li = microfacet_lambda(kind, alpha, wi);
@@ -100,9 +102,10 @@ INLINE vf microfacet_slope_integral(vf x, vf t, vf e)
     return 0.5f * MICROFACET_SQRT_PI * tail + 0.5f * t * e;
 }
 
-/* The slope s at which the integral of (1 - s t) exp(-s^2) is the fraction u of what a viewer at tan(theta) = t sees
- * of all slopes; t = 0 gives a normal variate of variance 1/2. Newton's method inside a shrinking bracket; `lanes` are wanted. A step of
- * 2e-4 is the last: the next would be of its square, which rounding does not let be seen. u is met to 4e-7. */
+/* The slope s at which the integral of (1 - s t) exp(-s^2) is the fraction u of what a viewer at
+ * tan(theta) = t sees of all slopes; t = 0 gives a normal variate of variance 1/2. Newton's method
+ * inside a shrinking bracket; `lanes` are wanted. A step of 2e-4 is the last: the next would be of
+ * its square, which rounding does not let be seen. u is met to 4e-7. */
 INLINE vf microfacet_slope(unsigned lanes, vf t, vf u)
 {
     const vf zero = vf_set(0), top = vf_set(6);

@@ -1,4 +1,4 @@
-/* The scene once more, as records that lanes fetch in rows of eight words. */
+/* Materials and triangles as records of eight-word rows, for lanes to gather. */
 #ifndef ASSAY_SCENE_SIMD_H
 #define ASSAY_SCENE_SIMD_H
 

@@ -1,4 +1,4 @@
-/* What the camera rays of a batch meet first, for the layers beside the image. */
+/* First hits of camera rays, for the layers beside the image (AOVs: depth, normal, albedo, object). */
 #ifndef ASSAY_AOV_H
 #define ASSAY_AOV_H
 

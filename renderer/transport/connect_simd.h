@@ -1,4 +1,5 @@
-/* The stage that looks for light: samples of lights, or directions of the hemisphere, from every vertex. */
+/* The connect stage, next event estimation: samples lights, or uniform directions of the hemisphere
+ * (-H), at every vertex and traces the shadow rays. */
 #ifndef ASSAY_CONNECT_SIMD_H
 #define ASSAY_CONNECT_SIMD_H
 

@@ -1,5 +1,6 @@
-/* What a render accumulates, pixel by pixel, and can be stopped and gone on with: the moments, the sums
- * of the adaptive rule and of the error estimate, and means over what the camera rays met first. */
+/* The accumulation buffer of a render: per pixel the moments, the sums of the adaptive rule and of
+ * the error estimate, and averages over the first hits (AOVs). A render can be stopped and resumed
+ * from it. */
 #ifndef ASSAY_FILM_H
 #define ASSAY_FILM_H
 
@@ -36,8 +37,9 @@ void film_set_sampler(struct film *f, enum sampler_kind kind);
 /* What the camera ray of lane i met, to a pixel of a film with first hits; after its radiance (film_simd.h). */
 void film_add_first_hit(struct film *f, size_t pixel, const struct first_hits *h, int i);
 
-/* Adds the samples of pixels first .. first+num-1 of src, which come after those that dst has of these pixels, by moments_merge(). Both are
- * films of the same size, with the same layers; targets and film.num_samples are not looked at. */
+/* Adds the samples of pixels first .. first+num-1 of src, which come after those that dst has of
+ * these pixels, by moments_merge(). Both are films of the same size, with the same layers; targets
+ * and film.num_samples are not looked at. */
 NODISCARD bool film_merge(struct film *dst, const struct film *src, size_t first, int num,
                           struct err *e);
 

@@ -1,4 +1,4 @@
-/* Samples into the sums of a film, as plain loops that the compiler turns into vectors. Part of
+/* Adds samples to the sums of a film, as plain loops that the compiler turns into vectors. Part of
  * integrator_simd.c. */
 #ifndef ASSAY_FILM_SIMD_H
 #define ASSAY_FILM_SIMD_H

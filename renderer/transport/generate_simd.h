@@ -1,4 +1,5 @@
-/* The first stage of a path, camera rays; and the other thing that they are for, showing normals. */
+/* The generate stage: camera rays. Also the image of normals (INTEGRATE_NORMALS), which needs only these rays' first
+ * hits. */
 #ifndef ASSAY_GENERATE_SIMD_H
 #define ASSAY_GENERATE_SIMD_H
 

@@ -1,4 +1,4 @@
-/* The light transport estimators, over batches of paths in stages: generate, intersect, shade,
+/* Path tracing: the estimators of light transport, over batches of paths in stages: generate, intersect, shade,
  * connect, scatter. One path is one sample of its pixel's radiance,
  * independent of the others if the sampler is. */
 #ifndef ASSAY_INTEGRATOR_H

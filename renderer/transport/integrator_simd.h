@@ -1,5 +1,5 @@
-/* The stages of the integrator on as many paths at a time as there are lanes, compiled once for each instruction set:
- * one lane for ISA_SCALAR, else eight. Every path has the same bits. */
+/* The integrator's stages, compiled once for each instruction set: one lane for ISA_SCALAR, eight for SSE4.2 and AVX2,
+ * sixteen for AVX-512. Every path gets the same bits at every width. */
 #ifndef ASSAY_INTEGRATOR_SIMD_H
 #define ASSAY_INTEGRATOR_SIMD_H
 

@@ -1,4 +1,4 @@
-/* What the stages of integrator_simd.c share. */
+/* Shared by the stages of integrator_simd.c. */
 #ifndef ASSAY_PATHS_SIMD_H
 #define ASSAY_PATHS_SIMD_H
 

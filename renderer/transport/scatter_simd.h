@@ -1,4 +1,5 @@
-/* The last stage at a vertex: where the path goes on. */
+/* The scatter stage, the last at each vertex: BSDF sampling, Russian roulette, and the next ray of every path that goes
+ * on. Surviving paths are moved to the front of the batch. */
 #ifndef ASSAY_SCATTER_SIMD_H
 #define ASSAY_SCATTER_SIMD_H
 
@@ -13,7 +14,7 @@ INLINE int first_at_risk(const struct integrator_options *o)
     return o->roulette == ROULETTE_OFF ? INT_MAX : o->roulette == ROULETTE_FIXED ? 1 : 2;
 }
 
-/* Chance to go on from this vertex. */
+/* Russian roulette: the probability with which a path continues from this vertex. */
 INLINE vf survival(const struct integrator_options *o, int vertex, rgbv throughput, vf eta2)
 {
     if (vertex < first_at_risk(o))

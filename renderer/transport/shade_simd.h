@@ -1,4 +1,5 @@
-/* The stage after the rays: what they have met, and what it emits. */
+/* The shade stage: the surface that each ray hit, its texture, and its emission with the weight of multiple importance
+ * sampling. */
 #ifndef ASSAY_SHADE_SIMD_H
 #define ASSAY_SHADE_SIMD_H
 
@@ -127,7 +128,8 @@ static __attribute__((noinline)) void add_emission(const struct integrator *it, 
     gather_light(b, k, lanes_of(mask), rgb_scalev(rgb_mulv(rgb_load(&b->throughput, k), le), w));
 }
 
-/* Multiplies the reflectance of the lanes of the mask by what their surfaces' textures have there; a path on black is over. */
+/* Multiplies the reflectance of the lanes of the mask by what their surfaces' textures have there;
+ * a path on black is over. */
 static __attribute__((noinline)) void apply_textures(const struct integrator *it, struct batch *b,
                                                      int k, unsigned mask)
 {

@@ -119,8 +119,9 @@ static const char *const programs[] = {
     "[",   "touch", "tr",  "true",    "truncate", "uname",  "uniq",     "wc",
 };
 
-/* All of /usr; or its libraries and `programs`, without what compilers keep among the libraries. Neither another renderer
- * that is installed here nor ours is a part of either's machine: a program might run it. */
+/* All of /usr; or its libraries and `programs`, without what compilers keep among the libraries.
+ * Neither another renderer that is installed here nor ours is a part of either's machine: a program
+ * might run it. */
 static void add_usr(struct sandbox_line *l, bool tools)
 {
     if (tools) {

@@ -32,8 +32,8 @@ struct channel_sweep {
 struct measured channel_sweep_measure(const struct judge *j, const struct pyramid *p, int level,
                                       size_t i);
 
-/* Tests them; of luminance, fills the images of `out` too, and touches nothing else of it. `levels` are the image's. Fails
- * only out of memory. Release with channel_sweep_close() in any case. */
+/* Tests them; of luminance, fills the images of `out` too, and touches nothing else of it. `levels`
+ * are the image's. Fails only out of memory. Release with channel_sweep_close() in any case. */
 NODISCARD bool channel_sweep_run(const struct judge *j, const struct moments *a,
                                  const struct moments *b, const struct pyramid *levels, int channel,
                                  struct channel_sweep *s, struct comparison *out, struct err *e);

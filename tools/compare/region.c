@@ -239,7 +239,8 @@ double region_pixel_t(const struct judge *j, const struct cell *cell, double *re
     return region_t(&m);
 }
 
-/* *x: quantile of alpha less the factor that skewness may put on it; false if that factor is too large to be trusted. */
+/* *x: quantile of alpha less the factor that skewness may put on it; false if that factor is too
+ * large to be trusted. */
 static bool raised_quantile(double skew, double alpha, double dof, double limit, double *x)
 {
     double factor = 0;

@@ -45,8 +45,8 @@ struct measured {
 
 struct measured region_measure(const struct judge *j, const struct cell *cell, struct rect r);
 
-/* Whether region_is_normal(), or region_testable(), will be false because of the skewness alone: most small regions fail
- * there. False says nothing. */
+/* Whether region_is_normal(), or region_testable(), will be false because of the skewness alone:
+ * most small regions fail there. False says nothing. */
 bool region_is_skewed(const struct judge *j, const struct cell *cell);
 /* The latter for a test by this statistic. */
 bool region_is_hopeless(const struct judge *j, const struct cell *cell, int statistic);

@@ -281,7 +281,8 @@ static bool compare(const struct work *w, const struct submitted_image *a,
     return true;
 }
 
-/* What the rule of stopping may do to this program: the range for an adaptive image with as much noise as the student's. */
+/* What the rule of stopping may do to this program: the range for an adaptive image with as much
+ * noise as the student's. */
 static bool stopping_of(const struct work *w, struct stopping *out, struct err *e)
 {
     struct submitted_image right;

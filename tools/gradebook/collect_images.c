@@ -11,7 +11,8 @@
 static const double step = 1.35; /* between the samples of two runs, at least */
 enum { MOST_RUNS = 12, MOST_ADAPTIVE = 6 };
 
-/* Seeds of images differ, or their noise would be the same; and they do not depend on what other images a rubric has [FNV-1a]. */
+/* Seeds of images differ, or their noise would be the same; and they do not depend on what other
+ * images a rubric has [FNV-1a]. */
 static uint64_t image_seed(uint64_t seed, const char *name)
 {
     uint64_t hash = 14695981039346656037u ^ seed;
@@ -131,8 +132,8 @@ static bool was_tried(const double *tried, int num, double spp)
     return false;
 }
 
-/* Samples of the next run of an image that needs `more` times those it has; 0: none is to be had. A square where the rubric
- * asks for one: programs that stratify a pixel count on it. */
+/* Samples of the next run of an image that needs `more` times those it has; 0: none is to be had. A
+ * square where the rubric asks for one: programs that stratify a pixel count on it. */
 static int next_samples(const struct collect *c, const struct purchases *b,
                         const struct submitted_images *h, int image, double more)
 {
@@ -256,9 +257,9 @@ static double mean_square(const struct submitted_image *a, const struct submitte
     return sum / num;
 }
 
-/* Of three runs, which have one bias: the squares of their differences should be as 1/s0 + 1/s1 and 1/s1 + 1/s2. False: they
- * do not fall by half of that (in logarithms). Clipping takes noise away from smaller runs: where there is much of
- * it, nothing is known. */
+/* Of three runs, which have one bias: the squares of their differences should be as 1/s0 + 1/s1 and
+ * 1/s1 + 1/s2. False: they do not fall by half of that (in logarithms). Clipping takes noise away
+ * from smaller runs: where there is much of it, nothing is known. */
 static bool has_fallen(const struct submitted_image *const *run, const unsigned char *use)
 {
     static const double few = 0.005, sure = 4.4; /* standard deviations: 1e-5 */

@@ -41,12 +41,13 @@ void plan_free(struct plan *p);
 bool job_run_is_made(const struct plan *p, int k);
 NODISCARD bool job_run_verify(const struct plan *p, int k, struct err *e);
 
-/* Makes it, if it is not there with the right hash: *made. Fails if an input is not the one that was planned with or the
- * program fails; then there is no artefact. Current directory: the plan's cwd. */
+/* Makes it, if it is not there with the right hash: *made. Fails if an input is not the one that
+ * was planned with or the program fails; then there is no artefact. Current directory: the plan's
+ * cwd. */
 NODISCARD bool job_run(const struct plan *p, int k, bool *made, struct err *e);
 
-/* Puts the artefacts together to what the command would have left, and returns its exit code. Fails with EXIT_NOT_JUDGED on
- * a job that is not made. Current directory: the plan's cwd. */
+/* Puts the artefacts together to what the command would have left, and returns its exit code. Fails
+ * with EXIT_NOT_JUDGED on a job that is not made. Current directory: the plan's cwd. */
 int plan_gather(const struct plan *p, struct err *e);
 
 /* Goes to the plan's cwd. */

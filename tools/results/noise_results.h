@@ -14,9 +14,9 @@
 /* Checks all that the functions below rely on; a failure is a line with file, scene, engine and member. */
 NODISCARD bool noise_results_check(const json_t *noise, const char *path, struct err *e);
 
-/* The rows of ours, for whoever lists claims: scene, "a" (the engine), "b" (what it is held against), "quantity" ("variance"),
- * expected, passed, verdict or error, reason; where the ratio has an interval, "difference" (ratio - 1), "ci" and "alpha". A new
- * reference, NULL out of memory. */
+/* The rows of ours, for whoever lists claims: scene, "a" (the engine), "b" (what it is held
+ * against), "quantity" ("variance"), expected, passed, verdict or error, reason; where the ratio
+ * has an interval, "difference" (ratio - 1), "ci" and "alpha". A new reference, NULL out of memory. */
 json_t *noise_results_claims(const json_t *noise);
 
 /* A cell of the table, for terminal, Markdown and page; empty where there is nothing to say. */

@@ -34,7 +34,8 @@ int variance_map_tile(const struct variance_map *m, int x, int y, int side);
 NODISCARD bool variance_ladder_between(const float *images, int count,
                                        const struct converge_reference *unit, int width, int tile,
                                        struct variance_map *out, struct err *e);
-/* K renders of unit "sample"; fails where a pixel holds fewer than two, or an M3 that no samples of 0 and more can have. */
+/* K renders of unit "sample"; fails where a pixel holds fewer than two, or an M3 that no samples of
+ * 0 and more can have. */
 NODISCARD bool variance_ladder_within(const struct moments *render, int count,
                                       const struct converge_reference *unit, int tile,
                                       struct variance_map *out, struct err *e);
@@ -53,13 +54,15 @@ struct variance_claim {
 double variance_ladder_reach(struct estimate record, double share);
 /* The margin that can be had against a record of this V: `least`, or what it reaches, at most 300 %. */
 double variance_ladder_margin(struct estimate record, double share, double least);
-/* An estimate of a run of the same engine: with the degrees of freedom that the record makes expect, if they are more. One
- * firefly in a run makes its standard error large and its own degrees of freedom few, one too often of the two. */
+/* An estimate of a run of the same engine: with the degrees of freedom that the record makes
+ * expect, if they are more. One firefly in a run makes its standard error large and its own degrees
+ * of freedom few, one too often of the two. */
 struct estimate variance_ladder_expect(struct estimate run, struct estimate record, double share);
 
-/* Two one-sided tests at alpha of V / wanted <= 1 + margin; if `both`, of >= 1/(1 + margin) too. DIFFERENT if the
- * interval lies outside, EQUIVALENT if inside, else INCONCLUSIVE, or, at the largest margin, NO DIFFERENCE FOUND: more could
- * not be promised. A `wanted` without noise wants none: then ratio is V itself, the margin variance_ladder_none. */
+/* Two one-sided tests at alpha of V / wanted <= 1 + margin; if `both`, of >= 1/(1 + margin) too.
+ * DIFFERENT if the interval lies outside, EQUIVALENT if inside, else INCONCLUSIVE, or, at the
+ * largest margin, NO DIFFERENCE FOUND: more could not be promised. A `wanted` without noise wants
+ * none: then ratio is V itself, the margin variance_ladder_none. */
 struct variance_claim variance_ladder_judge(struct estimate v, struct estimate wanted,
                                             double margin, bool both, double alpha);
 

@@ -197,9 +197,10 @@ static void share(struct replicates *r, double variance, uint64_t *state)
     }
 }
 
-/* One number added to all pixels of a replicate, with 2 % of the variance of each: no pair of pixels is
- * conspicuous, but sums over 16 x 16 vary 1 + 255 x 0.02 = 6 times too much (48
- * replicates, 4 squares of 256 pixels: one standard error of r is 1/sqrt(4 x 32640 x 47) = 0.0004). Control: with 0.05 % the ratio is 1.13, allowed. */
+/* One number added to all pixels of a replicate, with 2 % of the variance of each: no pair of
+ * pixels is conspicuous, but sums over 16 x 16 vary 1 + 255 x 0.02 = 6 times too much (48
+ * replicates, 4 squares of 256 pixels: one standard error of r is 1/sqrt(4 x 32640 x 47) = 0.0004).
+ * Control: with 0.05 % the ratio is 1.13, allowed. */
 TEST(pixels_that_share_noise_are_refused)
 {
     uint64_t seed = 11;
@@ -216,7 +217,8 @@ TEST(pixels_that_share_noise_are_refused)
     }
 }
 
-/* Samples on a grid of 4 x 4 a pixel, each counted by all pixels whose tent of radius 1 reaches it, as programs splat. */
+/* Samples on a grid of 4 x 4 a pixel, each counted by all pixels whose tent of radius 1 reaches it,
+ * as programs splat. */
 static struct replicates splat_all(int count, double sharing, uint64_t *state)
 {
     enum { FINE = 4, WIDE = FINE * (SIDE + 1) };

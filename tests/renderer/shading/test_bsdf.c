@@ -312,8 +312,8 @@ TEST(values_and_reciprocity)
     }
 }
 
-/* f = kd/pi + ks D G / (4 cos cos), sampled by shares in proportion to the largest colours; the mirror's share of the samples
- * has the weight kr over that share. */
+/* f = kd/pi + ks D G / (4 cos cos), sampled by shares in proportion to the largest colours; the
+ * mirror's share of the samples has the weight kr over that share. */
 TEST(plastic_is_the_sum_of_its_lobes)
 {
     int told = 0, rounds = 5000;
