@@ -86,6 +86,29 @@ bool json_get_text(const struct json_node *n, const char *key, char *out, size_t
     return true;
 }
 
+bool json_has(const struct json_node *n, const char *key)
+{
+    return json_object_get(n->object, key) != NULL;
+}
+
+bool json_may_int(const struct json_node *n, const char *key, int lo, int hi, int *out,
+                  struct err *e)
+{
+    return !json_has(n, key) || json_get_int(n, key, lo, hi, out, e);
+}
+
+bool json_may_number(const struct json_node *n, const char *key, double lo, double hi, double *out,
+                     struct err *e)
+{
+    return !json_has(n, key) || json_get_number(n, key, lo, hi, out, e);
+}
+
+bool json_may_text(const struct json_node *n, const char *key, char *out, size_t size,
+                   struct err *e)
+{
+    return !json_has(n, key) || json_get_text(n, key, out, size, e);
+}
+
 json_t *json_finite(double v)
 {
     return isfinite(v) ? json_real(v) : json_null();

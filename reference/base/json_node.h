@@ -33,6 +33,15 @@ NODISCARD bool json_get_number(const struct json_node *n, const char *key, doubl
 NODISCARD bool json_get_text(const struct json_node *n, const char *key, char *out, size_t size,
                              struct err *e);
 
+/* The same of a member that may be missing: *out is left as it is then. */
+NODISCARD bool json_may_int(const struct json_node *n, const char *key, int lo, int hi, int *out,
+                            struct err *e);
+NODISCARD bool json_may_number(const struct json_node *n, const char *key, double lo, double hi,
+                               double *out, struct err *e);
+NODISCARD bool json_may_text(const struct json_node *n, const char *key, char *out, size_t size,
+                             struct err *e);
+bool json_has(const struct json_node *n, const char *key);
+
 /* A number, and an interval as [lo, hi], or null where one of them is not finite. */
 json_t *json_finite(double v);
 json_t *json_interval(double lo, double hi);

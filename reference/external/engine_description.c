@@ -124,7 +124,7 @@ static bool read_features(const struct json_node *n, struct engine *en, struct e
 {
     json_t *array, *value;
     size_t index;
-    if (en->takes_files && json_object_get(n->object, "expresses") == NULL)
+    if (en->takes_files && !json_has(n, "expresses"))
         return true;
     if (en->takes_files)
         return err_set(
@@ -151,7 +151,7 @@ static bool read_extra(const struct json_node *n, const struct engine *en, const
                        const char *const *names, enum feature feature, struct err *e)
 {
     unsigned used;
-    bool has = json_object_get(n->object, key) != NULL;
+    bool has = json_has(n, key);
     bool wants = en->format == NULL && !en->takes_files && (en->feature & 1u << feature);
     if (has && (en->format != NULL || en->takes_files))
         return err_set(e, "%s: '%s' is for \"format\": \"dae\" only", n->file, key);
@@ -166,17 +166,11 @@ static bool read_extra(const struct json_node *n, const struct engine *en, const
     return true;
 }
 
-static bool read_optional_int(const struct json_node *n, const char *key, int lo, int hi, int *out,
-                              struct err *e)
-{
-    return json_object_get(n->object, key) == NULL || json_get_int(n, key, lo, hi, out, e);
-}
-
 static bool read_margin(const struct json_node *n, struct engine *en, struct err *e)
 {
     static const char *const keys[] = {"global", "tile", "reason", NULL};
     struct json_node m = {n->file, "margin.", NULL};
-    if (json_object_get(n->object, "margin") == NULL)
+    if (!json_has(n, "margin"))
         return true;
     return json_get_object(n, "margin", &m.object, e) && json_only_keys(&m, keys, e) &&
            json_get_number(&m, "global", 0, 1, &en->margin_global, e) &&
@@ -188,8 +182,7 @@ static bool read_margin(const struct json_node *n, struct engine *en, struct err
 static bool read_channels(const struct json_node *n, struct engine *en, struct err *e)
 {
     int word = 0;
-    if (json_object_get(n->object, "channels") != NULL &&
-        !get_word(n, "channels", channel_names, &word, e))
+    if (json_has(n, "channels") && !get_word(n, "channels", channel_names, &word, e))
         return false;
     en->separate = word == 1;
     if (en->separate && en->format == NULL)
@@ -207,7 +200,7 @@ static bool read_filter(const struct json_node *n, struct engine *en, struct err
 {
     char text[PIXEL_FILTER_TEXT];
     json_t *shared = json_object_get(n->object, "shared_samples");
-    if (json_object_get(n->object, "filter") == NULL)
+    if (!json_has(n, "filter"))
         return shared == NULL ||
                err_set(e, "%s: 'shared_samples' is about a 'filter', which is not there", n->file);
     if (shared != NULL && !json_is_boolean(shared))
@@ -257,22 +250,19 @@ static bool read_engine(const char *path, struct engine *en, struct err *e)
     if (!get_word(&n, "output", output_names, &word, e))
         return false;
     en->output = (enum engine_output)word;
-    if (json_object_get(en->json, "image") != NULL &&
-        !get_word(&n, "image", image_names, &image, e))
+    if (json_has(&n, "image") && !get_word(&n, "image", image_names, &image, e))
         return false;
     strcpy(en->image, image_names[image]);
     if (en->output == OUTPUT_MOMENTS && image != 0)
         return err_set(e, "%s: moments are in an exr, not in a %s", path, en->image);
-    if (json_object_get(en->json, "version") != NULL &&
-        !check_arguments(&n, "version", in_version, &used, e))
+    if (json_has(&n, "version") && !check_arguments(&n, "version", in_version, &used, e))
         return false;
     return read_features(&n, en, e) && read_command(&n, en, e) &&
-           read_optional_int(&n, "depth_offset", -1, 1, &en->depth_offset, e) &&
+           json_may_int(&n, "depth_offset", -1, 1, &en->depth_offset, e) &&
            read_margin(&n, en, e) && read_channels(&n, en, e) && read_filter(&n, en, e) &&
-           (json_object_get(en->json, "scale") == NULL ||
-            json_get_number(&n, "scale", 0, 1e30, &en->scale, e)) &&
-           read_optional_int(&n, "spp", 1, 1 << 24, &en->spp, e) &&
-           read_optional_int(&n, "replicates", 3, 4096, &en->replicates, e) &&
+           json_may_number(&n, "scale", 0, 1e30, &en->scale, e) &&
+           json_may_int(&n, "spp", 1, 1 << 24, &en->spp, e) &&
+           json_may_int(&n, "replicates", 3, 4096, &en->replicates, e) &&
            read_extra(&n, en, "lens_args", in_lens, FEATURE_LENS, e) &&
            read_extra(&n, en, "environment_args", in_environment, FEATURE_ENVIRONMENT, e);
 }

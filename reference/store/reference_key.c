@@ -1,26 +1,24 @@
-#include "reference_render.h"
+#include "reference_internal.h"
 
-#include "reference/external/engine_bindings.h"
 #include "reference/base/process.h"
 
 #include "renderer/base/fs.h"
 #include "renderer/base/sha256.h"
 
 #include <assert.h>
-#include <errno.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* Raised when a driver makes something else of the same files: other replicates, another fold. */
 enum { RECIPE = 1, MOST_SCRIPTS = 8 };
 
-/* Of the program, of its scripts, and of what the driver says. */
-static bool hash_parts(const struct engine_driver *driver, const struct reference_job *job,
-                       const char *path, char hex[3][65], struct err *e)
+/* Hashes of the program, of its scripts, and of what the driver says. */
+static bool hash_parts(const struct reference_job *job, void *ctx, struct err *e)
 {
+    char(*hex)[65] = ctx, program[4096], all[64 * MOST_SCRIPTS + 1];
+    const struct engine_driver *driver = engine_driver_of(job->ref->engine);
     const char *name = engine_kind_of(job->ref->engine)->program;
-    char program[4096], all[64 * MOST_SCRIPTS + 1];
+    const struct path said = fs_path("%s/scene", job->dir);
     strcpy(hex[1], "none");
     for (int i = 0; driver->scripts != NULL && driver->scripts[i] != NULL; i++) {
         assert(i < MOST_SCRIPTS);
@@ -31,37 +29,18 @@ static bool hash_parts(const struct engine_driver *driver, const struct referenc
     }
     if (!process_find(name, program, sizeof program))
         return err_set(e, "%s: no such program in PATH", name);
-    return sha256_file(program, hex[0], e) && driver->write_key(job, path, e) &&
-           sha256_file(path, hex[2], e);
+    return sha256_file(program, hex[0], e) && driver->write_key(job, said.s, e) &&
+           sha256_file(said.s, hex[2], e);
 }
 
 bool reference_key(const struct suite_scene *scene, const struct suite_reference *ref,
                    const struct reference_options *opt, char key[65], struct err *e)
 {
     assert(opt->first_replicate == 0);
-    const struct engine_driver *driver = engine_driver_of(ref->engine);
-    if (driver == NULL)
+    if (engine_driver_of(ref->engine) == NULL)
         return err_set(e, "%s: '%s' is no engine that is rendered", scene->name, ref->engine);
     char text[1024], hex[3][65];
-    struct scene s;
-    struct camera camera;
-    struct path dir = fs_path("%s/key-XXXXXX", opt->work_dir);
-    if (!suite_open(scene, &s, &camera, e))
-        return false;
-    struct reference_job job = {
-        .suite = scene, .ref = ref, .opt = opt, .scene = &s, .camera = &camera};
-    bool ok = mkdtemp(dir.s) != NULL ||
-              err_set(e, "%s: cannot make a directory in it: %s", opt->work_dir, strerror(errno));
-    if (ok) {
-        ok = hash_parts(driver, &job, fs_path("%s/scene", dir.s).s, hex, e);
-        struct err cleanup;
-        if (!fs_remove_tree(dir.s, &cleanup) && ok) {
-            *e = cleanup;
-            ok = false;
-        }
-    }
-    scene_free(&s);
-    if (!ok)
+    if (!reference_in_directory(scene, ref, opt, hash_parts, hex, e))
         return err_prefix(e, "%s, %s", scene->name, ref->engine);
     snprintf(text, sizeof text,
              "recipe %d engine %s %s script %s export %s scene %s %d x %d depth %d replicates %d "

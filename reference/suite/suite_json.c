@@ -38,6 +38,27 @@ bool suite_noise_is_known(const char *kind)
     return strcmp(kind, "rectangle_over_plane") == 0;
 }
 
+bool suite_json_check_class(const struct json_node *n, const struct suite_reference *r,
+                            struct err *e)
+{
+    return strcmp(r->fidelity, "exact") == 0 || strcmp(r->fidelity, "limit") == 0 ||
+           strcmp(r->fidelity, "approximate") == 0 ||
+           err_set(e, "%s: '%sclass' is '%s', not 'exact', 'limit' or 'approximate'", n->file,
+                   n->at, r->fidelity);
+}
+
+/* One replicate would have no variance. */
+bool suite_json_read_settings(const struct json_node *n, const struct engine_kind *kind,
+                              struct suite_reference *r, struct err *e)
+{
+    if (kind == NULL)
+        return json_get_text(n, "kind", r->kind, sizeof r->kind, e) &&
+               json_get_object(n, "values", &r->values, e);
+    return json_get_int(n, "replicates", 2, 4096, &r->replicates, e) &&
+           (kind->subgrid ? json_get_int(n, "subgrid", 1, 64, &r->subgrid, e)
+                          : json_get_int(n, "spp", 1, 1 << 20, &r->spp, e));
+}
+
 /* The keys that every reference has and those of its engine. */
 static bool read_reference(const char *file, const char *engine, json_t *object,
                            struct suite_reference *r, struct err *e)
@@ -60,23 +81,11 @@ static bool read_reference(const char *file, const char *engine, json_t *object,
     snprintf(at, sizeof at, "references.%s.", engine);
     struct json_node n = {file, at, object};
     snprintf(r->engine, sizeof r->engine, "%s", engine);
-    if (!json_only_keys(&n, keys, e) ||
-        !json_get_text(&n, "class", r->fidelity, sizeof r->fidelity, e) ||
-        !json_get_number(&n, "margin_global", 0, 1, &r->margin_global, e) ||
-        !json_get_number(&n, "margin_tile", 0, 1, &r->margin_tile, e))
-        return false;
-    if (strcmp(r->fidelity, "exact") != 0 && strcmp(r->fidelity, "limit") != 0 &&
-        strcmp(r->fidelity, "approximate") != 0)
-        return err_set(e, "%s: '%sclass' is '%s', not 'exact', 'limit' or 'approximate'", file, at,
-                       r->fidelity);
-    if (truth)
-        return json_get_text(&n, "kind", r->kind, sizeof r->kind, e) &&
-               json_get_object(&n, "values", &r->values, e);
-    /* One replicate would have no variance. */
-    if (!json_get_int(&n, "replicates", 2, 4096, &r->replicates, e))
-        return false;
-    return subgrid ? json_get_int(&n, "subgrid", 1, 64, &r->subgrid, e)
-                   : json_get_int(&n, "spp", 1, 1 << 20, &r->spp, e);
+    return json_only_keys(&n, keys, e) &&
+           json_get_text(&n, "class", r->fidelity, sizeof r->fidelity, e) &&
+           json_get_number(&n, "margin_global", 0, 1, &r->margin_global, e) &&
+           json_get_number(&n, "margin_tile", 0, 1, &r->margin_tile, e) &&
+           suite_json_check_class(&n, r, e) && suite_json_read_settings(&n, kind, r, e);
 }
 
 static bool read_references(const char *file, json_t *object, struct suite_scene *s, struct err *e)
@@ -96,7 +105,7 @@ static bool read_references(const char *file, json_t *object, struct suite_scene
 static bool read_environment(const struct json_node *n, struct suite_scene *s, struct err *e)
 {
     char name[256];
-    if (json_object_get(n->object, "environment") == NULL)
+    if (!json_has(n, "environment"))
         return true;
     if (!json_get_text(n, "environment", name, sizeof name, e))
         return false;
@@ -123,13 +132,11 @@ static bool check_uses(const struct json_node *n, struct err *e)
     return true;
 }
 
-static bool read_lens(const struct json_node *n, struct suite_scene *s, struct err *e)
+bool suite_json_read_lens(const struct json_node *n, struct suite_scene *s, struct err *e)
 {
-    if (json_object_get(n->object, "lens_radius") == NULL &&
-        json_object_get(n->object, "focal_distance") == NULL)
-        return true;
-    return json_get_number(n, "lens_radius", 0, 1e6, &s->lens_radius, e) &&
-           json_get_number(n, "focal_distance", 0, 1e9, &s->focal_distance, e);
+    return (!json_has(n, "lens_radius") && !json_has(n, "focal_distance")) ||
+           (json_get_number(n, "lens_radius", 0, 1e6, &s->lens_radius, e) &&
+            json_get_number(n, "focal_distance", 0, 1e9, &s->focal_distance, e));
 }
 
 static bool read_variant(const char *file, int i, json_t *object, struct suite_variant *v,
@@ -187,20 +194,16 @@ static bool read_consistency(const struct json_node *n, struct suite_scene *s, s
     static const char *const adaptive_keys[] = {"batch", "tolerance", "spp", NULL};
     struct json_node c = {n->file, "consistency.", NULL};
     struct json_node a = {n->file, "consistency.adaptive.", NULL};
-    if (json_object_get(n->object, "consistency") == NULL)
+    if (!json_has(n, "consistency"))
         return true;
     if (!json_get_object(n, "consistency", &c.object, e) || !json_only_keys(&c, keys, e) ||
         !json_get_int(&c, "renders", 4, 256, &s->consistency.renders, e) ||
         !json_get_int(&c, "spp", 2, 1 << 16, &s->consistency.spp, e) ||
-        !json_get_number(&c, "margin", 0, 10, &s->consistency.margin, e))
+        !json_get_number(&c, "margin", 0, 10, &s->consistency.margin, e) ||
+        !json_may_number(&c, "noise_margin", 0, 10, &s->consistency.noise_margin, e) ||
+        !json_may_int(&c, "parts", 1, s->consistency.spp - 1, &s->consistency.parts, e))
         return false;
-    if (json_object_get(c.object, "noise_margin") != NULL &&
-        !json_get_number(&c, "noise_margin", 0, 10, &s->consistency.noise_margin, e))
-        return false;
-    if (json_object_get(c.object, "parts") != NULL &&
-        !json_get_int(&c, "parts", 1, s->consistency.spp - 1, &s->consistency.parts, e))
-        return false;
-    return json_object_get(c.object, "adaptive") == NULL ||
+    return !json_has(&c, "adaptive") ||
            (json_get_object(&c, "adaptive", &a.object, e) && json_only_keys(&a, adaptive_keys, e) &&
             json_get_int(&a, "batch", 2, 1 << 16, &s->consistency.batch, e) &&
             json_get_int(&a, "spp", 2, 1 << 24, &s->consistency.most, e) &&
@@ -219,7 +222,7 @@ static bool check_noise(const char *file, const struct suite_scene *s, struct er
 /* An engine either has a reference or a reason, not both. */
 static bool read_not_expressible(const struct json_node *n, struct suite_scene *s, struct err *e)
 {
-    if (json_object_get(n->object, "not_expressible") == NULL)
+    if (!json_has(n, "not_expressible"))
         return true;
     if (!json_get_object(n, "not_expressible", &s->not_expressible, e))
         return false;
@@ -264,8 +267,7 @@ bool suite_json_read(const char *file, struct suite_scene *s, struct err *e)
         !json_get_text(&n, "title", s->title, sizeof s->title, e) ||
         !json_get_text(&n, "detects", s->detects, sizeof s->detects, e) ||
         !json_get_text(&n, "blind_to", s->blind_to, sizeof s->blind_to, e) ||
-        (json_object_get(s->json, "convention") != NULL &&
-         !json_get_text(&n, "convention", s->convention, sizeof s->convention, e)) ||
+        !json_may_text(&n, "convention", s->convention, sizeof s->convention, e) ||
         !json_get_int(&n, "width", 1, 16384, &s->width, e) ||
         !json_get_int(&n, "height", 1, 16384, &s->height, e) ||
         !json_get_int(&n, "depth", 0, 100, &s->depth, e) ||
@@ -277,7 +279,7 @@ bool suite_json_read(const char *file, struct suite_scene *s, struct err *e)
     if (!verdict_parse(expect, &s->expect) || s->expect != wanted)
         return err_set(e, "%s: 'expect' is '%s', but scenes of family %c must be %s", file, expect,
                        s->name[0], verdict_name(wanted));
-    if (!check_uses(&n, e) || !read_environment(&n, s, e) || !read_lens(&n, s, e) ||
+    if (!check_uses(&n, e) || !read_environment(&n, s, e) || !suite_json_read_lens(&n, s, e) ||
         !read_variants(&n, s, e) || !read_consistency(&n, s, e))
         return false;
     if (must_differ)

@@ -1,5 +1,7 @@
 #include "suite_own.h"
 
+#include "suite_json.h"
+
 #include "reference/base/json_file.h"
 #include "reference/base/json_node.h"
 
@@ -45,33 +47,16 @@ static bool read_path(const struct json_node *n, const char *key, const char *di
            err_set(e, "%s: '%s%s' is '%s', which cannot be read", n->file, n->at, key, out);
 }
 
-static bool has(const struct json_node *n, const char *key)
-{
-    return json_object_get(n->object, key) != NULL;
-}
-
 /* "margin" is of the image, and four times that of a tile; either can be given by itself. */
 static bool read_margins(const struct json_node *n, double *global, double *tile, struct err *e)
 {
-    if (has(n, "margin")) {
+    if (json_has(n, "margin")) {
         if (!json_get_number(n, "margin", 0, 1, global, e))
             return false;
         *tile = fmin(4 * *global, 0.99);
     }
-    return (!has(n, "margin_global") || json_get_number(n, "margin_global", 0, 1, global, e)) &&
-           (!has(n, "margin_tile") || json_get_number(n, "margin_tile", 0, 1, tile, e));
-}
-
-static bool read_int(const struct json_node *n, const char *key, int lo, int hi, int *out,
-                     struct err *e)
-{
-    return !has(n, key) || json_get_int(n, key, lo, hi, out, e);
-}
-
-static bool read_text(const struct json_node *n, const char *key, char *out, size_t size,
-                      struct err *e)
-{
-    return !has(n, key) || json_get_text(n, key, out, size, e);
+    return json_may_number(n, "margin_global", 0, 1, global, e) &&
+           json_may_number(n, "margin_tile", 0, 1, tile, e);
 }
 
 /* Margins: those of the scene so far. */
@@ -94,27 +79,21 @@ static bool read_reference(const struct json_node *n, const char *name, struct s
                                 NULL};
     snprintf(r->engine, sizeof r->engine, "%s", name);
     strcpy(r->fidelity, "exact");
-    if (!json_only_keys(n, keys, e) || !read_text(n, "class", r->fidelity, sizeof r->fidelity, e) ||
+    if (!json_only_keys(n, keys, e) ||
+        !json_may_text(n, "class", r->fidelity, sizeof r->fidelity, e) ||
         !read_margins(n, &r->margin_global, &r->margin_tile, e))
         return false;
-    if (strcmp(r->fidelity, "exact") != 0 && strcmp(r->fidelity, "limit") != 0 &&
-        strcmp(r->fidelity, "approximate") != 0)
-        return err_set(e, "%s: '%sclass' is '%s', not 'exact', 'limit' or 'approximate'", n->file,
-                       n->at, r->fidelity);
+    if (!suite_json_check_class(n, r, e))
+        return false;
     if (!(r->margin_global > 0) || !(r->margin_tile > 0))
         return err_set(e, "%s: '%smargin' is given neither there nor for the scene or the suite",
                        n->file, n->at);
-    if (truth)
-        return json_get_text(n, "kind", r->kind, sizeof r->kind, e) &&
-               json_get_object(n, "values", &r->values, e);
     if (ours)
-        return read_int(n, "spp", 2, 1 << 24, &s->spp, e);
-    if (kind == NULL)
-        return read_int(n, "replicates", 3, 4096, &r->replicates, e) &&
-               read_int(n, "spp", 1, 1 << 24, &r->spp, e);
-    return json_get_int(n, "replicates", 2, 4096, &r->replicates, e) &&
-           (grid ? json_get_int(n, "subgrid", 1, 64, &r->subgrid, e)
-                 : json_get_int(n, "spp", 1, 1 << 20, &r->spp, e));
+        return json_may_int(n, "spp", 2, 1 << 24, &s->spp, e);
+    if (kind == NULL && !truth)
+        return json_may_int(n, "replicates", 3, 4096, &r->replicates, e) &&
+               json_may_int(n, "spp", 1, 1 << 24, &r->spp, e);
+    return suite_json_read_settings(n, kind, r, e);
 }
 
 /* Those of the suite and of the scene in one object: of what both name, the scene's members count. null: not of this scene. */
@@ -177,8 +156,8 @@ static bool read_expected(const struct json_node *n, struct suite_scene *s, stru
 {
     char expect[32] = "EQUIVALENT";
     strcpy(s->references_of, s->name);
-    if (!read_text(n, "references_of", s->references_of, sizeof s->references_of, e) ||
-        !read_text(n, "expect", expect, sizeof expect, e))
+    if (!json_may_text(n, "references_of", s->references_of, sizeof s->references_of, e) ||
+        !json_may_text(n, "expect", expect, sizeof expect, e))
         return false;
     return (verdict_parse(expect, &s->expect) && verdict_decides(s->expect)) ||
            err_set(e, "%s: '%sexpect' is '%s', not 'EQUIVALENT' or 'DIFFERENT'", n->file, n->at,
@@ -201,30 +180,27 @@ static bool read_scene(const struct json_node *n, const char *dir, double global
     if (!json_only_keys(n, keys, e) || !read_path(n, "file", dir, s->dae, sizeof s->dae, e) ||
         !read_uses(n, e) || !json_get_int(n, "width", 1, 16384, &s->width, e) ||
         !json_get_int(n, "height", 1, 16384, &s->height, e) ||
-        !read_int(n, "depth", 0, 100, &s->depth, e) ||
-        !read_int(n, "tile", 1, 16384, &s->tile, e) ||
-        !read_text(n, "title", s->title, sizeof s->title, e) ||
-        !read_text(n, "detects", s->detects, sizeof s->detects, e) ||
-        !read_text(n, "blind_to", s->blind_to, sizeof s->blind_to, e) ||
-        !read_text(n, "convention", s->convention, sizeof s->convention, e) ||
+        !json_may_int(n, "depth", 0, 100, &s->depth, e) ||
+        !json_may_int(n, "tile", 1, 16384, &s->tile, e) ||
+        !json_may_text(n, "title", s->title, sizeof s->title, e) ||
+        !json_may_text(n, "detects", s->detects, sizeof s->detects, e) ||
+        !json_may_text(n, "blind_to", s->blind_to, sizeof s->blind_to, e) ||
+        !json_may_text(n, "convention", s->convention, sizeof s->convention, e) ||
         !read_expected(n, s, e) || !read_margins(n, &global, &tile, e))
         return false;
     const char *dot = strrchr(s->dae, '.');
     s->is_opaque = dot == NULL || strcmp(dot, ".dae") != 0;
     for (size_t i = 0; s->is_opaque && i < 3; i++) {
         static const char *const of_dae[] = {"environment", "lens_radius", "focal_distance"};
-        if (has(n, of_dae[i]))
+        if (json_has(n, of_dae[i]))
             return err_set(e, "%s: '%s%s' is for scenes in COLLADA (.dae)", n->file, n->at,
                            of_dae[i]);
     }
-    if (has(n, "environment") &&
+    if (json_has(n, "environment") &&
         !read_path(n, "environment", dir, s->environment, sizeof s->environment, e))
         return false;
-    if ((has(n, "lens_radius") || has(n, "focal_distance")) &&
-        (!json_get_number(n, "lens_radius", 0, 1e6, &s->lens_radius, e) ||
-         !json_get_number(n, "focal_distance", 0, 1e9, &s->focal_distance, e)))
-        return false;
-    return strcmp(s->references_of, s->name) != 0 || read_references(n, s, global, tile, e);
+    return suite_json_read_lens(n, s, e) &&
+           (strcmp(s->references_of, s->name) != 0 || read_references(n, s, global, tile, e));
 }
 
 static int by_name(const void *a, const void *b)
@@ -253,9 +229,9 @@ static bool read_scenes(const struct json_node *n, const char *dir, json_t *scen
         const struct json_node scene = {n->file, at, s->json};
         if (!json_is_object(value))
             return err_set(e, "%s: 'scenes.%s' is not an object", n->file, name);
-        if (has(&scene, "references") && !json_is_object(json_object_get(value, "references")))
+        if (json_has(&scene, "references") && !json_is_object(json_object_get(value, "references")))
             return err_set(e, "%s: 'scenes.%s.references' is not an object", n->file, name);
-        if (has(&scene, "references") || !has(&scene, "references_of"))
+        if (json_has(&scene, "references") || !json_has(&scene, "references_of"))
             json_object_set_new(s->json, "references",
                                 merge_references(references, json_object_get(value, "references")));
         if (!read_scene(&scene, dir, global, tile, s, e))
@@ -279,11 +255,12 @@ bool suite_own_read(const char *dir, struct suite *out, struct err *e)
         return false;
     const struct json_node n = {file, "", root};
     bool ok = json_is_object(root) || err_set(e, "%s: not an object", file);
-    ok = ok && json_only_keys(&n, keys, e) && read_int(&n, "version", 1, 1, &version, e) &&
-         read_text(&n, "comment", comment, sizeof comment, e) &&
-         (!has(&n, "references") || json_is_object(json_object_get(root, "references")) ||
+    ok = ok && json_only_keys(&n, keys, e) && json_may_int(&n, "version", 1, 1, &version, e) &&
+         json_may_text(&n, "comment", comment, sizeof comment, e) &&
+         (!json_has(&n, "references") || json_is_object(json_object_get(root, "references")) ||
           err_set(e, "%s: 'references' is not an object", file)) &&
-         (!has(&n, "engine") || read_path(&n, "engine", dir, out->engine, sizeof out->engine, e)) &&
+         (!json_has(&n, "engine") ||
+          read_path(&n, "engine", dir, out->engine, sizeof out->engine, e)) &&
          json_get_object(&n, "scenes", &scenes, e) &&
          (json_object_size(scenes) > 0 || err_set(e, "%s: 'scenes' is empty", file));
     if (ok) {
