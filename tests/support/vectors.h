@@ -23,4 +23,24 @@ static inline void unit3(double v[3])
         v[k] /= length;
 }
 
+/* Irradiance at a point, whose normal is n, from a polygon of radiance 1 that it sees in full: Lambert's formula, half the sum
+ * over the edges of the angle that the edge subtends times the cosine between n and the normal of the plane through edge and
+ * point. Below zero where the corners go round the other way. */
+static inline double lambert_irradiance(const double (*corner)[3], int num, const double at[3],
+                                        const double n[3])
+{
+    double sum = 0;
+    for (int i = 0; i < num; i++) {
+        double a[3], b[3], normal[3];
+        for (int k = 0; k < 3; k++) {
+            a[k] = corner[i][k] - at[k];
+            b[k] = corner[(i + 1) % num][k] - at[k];
+        }
+        cross3(b, a, normal);
+        double sine = sqrt(dot3(normal, normal));
+        sum += sine > 0 ? atan2(sine, dot3(a, b)) * dot3(n, normal) / sine : 0;
+    }
+    return sum / 2;
+}
+
 #endif

@@ -5,6 +5,7 @@
 #include "renderer/base/fs.h"
 #include "tests/support/own.h"
 #include "tests/support/test.h"
+#include "tests/support/vectors.h"
 
 #include <sys/stat.h>
 
@@ -231,27 +232,16 @@ PROBE(point_light_on_a_wall)
 }
 
 /* The same wall but smaller; an emitter of radiance 10, x = .5 (its plane stands on the wall), y in -.4 .. .4,
- * z in -1.3 .. -.7, emits towards -x. Irradiance by Lambert's contour formula: half the sum over the
- * edges of the angle they subtend times the z component of the unit normal of edge and receiver.
- * Nothing arrives behind it. */
+ * z in -1.3 .. -.7, emits towards -x. Nothing arrives behind it. */
 static void standing_emitter_radiance(const double d[3], double out[3], const void *data)
 {
     (void)data;
     static const double albedo[3] = {.5, .25, .8};
-    static const double corner[4][2] = {{-.4, -1.3}, {.4, -1.3}, {.4, -.7}, {-.4, -.7}};
-    double p[3] = {2 * d[0], 2 * d[1], -2}, sum = 0;
-    for (int i = 0; i < 4; i++) {
-        const double *ci = corner[i], *cj = corner[(i + 1) % 4];
-        double a[3] = {.5 - p[0], ci[0] - p[1], ci[1] - p[2]};
-        double b[3] = {.5 - p[0], cj[0] - p[1], cj[1] - p[2]};
-        double n[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2],
-                       a[0] * b[1] - a[1] * b[0]};
-        double sine = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-        double angle = atan2(sine, a[0] * b[0] + a[1] * b[1] + a[2] * b[2]);
-        sum += sine > 0 ? angle * n[2] / sine : 0;
-    }
+    static const double corner[4][3] = {
+        {.5, -.4, -1.3}, {.5, .4, -1.3}, {.5, .4, -.7}, {.5, -.4, -.7}};
+    const double p[3] = {2 * d[0], 2 * d[1], -2}, n[3] = {0, 0, 1};
     for (int c = 0; c < 3; c++)
-        out[c] = p[0] < .5 ? albedo[c] / M_PI * 10 * fabs(sum) / 2 : 0;
+        out[c] = p[0] < .5 ? albedo[c] / M_PI * 10 * fabs(lambert_irradiance(corner, 4, p, n)) : 0;
 }
 
 PROBE(emitter_that_stands_on_the_wall)

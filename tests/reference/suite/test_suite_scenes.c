@@ -86,33 +86,11 @@ static double worst_z(const struct moments *m, const double *expected, int side,
 }
 
 /* 36_mesh_lamp: a room of five walls and the lamp, which is convex, so that a triangle which faces a
- * point of a wall is seen from there in full. Lambert's formula for the irradiance of a polygon of
- * radiance 1: half the sum over its edges of the angle that the edge subtends times the cosine
- * between the wall's normal and the normal of the plane through the edge and the point. */
+ * point of a wall is seen from there in full. */
 static double lamp_corners[6][3] = {{.42, .95, .05}, {.05, 1.02, -.3}, {-.35, .9, 0},
                                     {0, .85, .38},   {0, 1.15, 0},     {.06, .5, .05}};
 static const int lamp_triangles[8][3] = {{0, 1, 4}, {1, 0, 5}, {1, 2, 4}, {2, 1, 5},
                                          {2, 3, 4}, {3, 2, 5}, {3, 0, 4}, {0, 3, 5}};
-
-static double irradiance(double p[3][3], const double at[3], const double n[3])
-{
-    double v[3][3], sum = 0, side[3], w[3];
-    for (int i = 0; i < 3; i++) {
-        for (int k = 0; k < 3; k++)
-            v[i][k] = p[i][k] - at[k];
-        unit3(v[i]);
-    }
-    cross3(v[0], v[1], w);
-    if (dot3(w, v[2]) >= 0) /* the point is behind */
-        return 0;
-    for (int i = 0; i < 3; i++) {
-        const double *a = v[i], *b = v[(i + 1) % 3];
-        cross3(b, a, side);
-        unit3(side);
-        sum += acos(dot3(a, b)) * dot3(n, side);
-    }
-    return sum / 2;
-}
 
 /* What a ray of that room's camera sees of direct light, or -1 if it meets the lamp. `skip`: a triangle
  * of the lamp that is left out, -1 for none. */
@@ -147,7 +125,8 @@ static bool mesh_lamp_ray(const struct view *view, const double d[3], int skip, 
         at[k] = view->eye[k] + t * d[k];
     double e = 0;
     for (int i = 0; i < 8; i++)
-        e += i == skip ? 0 : irradiance(corners[i], at, walls[wall].normal);
+        if (i != skip) /* below zero: the point is behind the triangle */
+            e += fmax(0, lambert_irradiance(corners[i], 3, at, walls[wall].normal));
     for (int c = 0; c < 3; c++)
         l[c] = walls[wall].albedo[c] / M_PI * radiance[c] * e;
     return true;

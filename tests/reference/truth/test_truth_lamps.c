@@ -88,7 +88,8 @@ TEST(furnace_matches_quadrature)
         }
 }
 
-/* 10: 1.2 (1 + .3), .8 (1 + .6), .4 (1 + .9). 14: the series' closed form, 20 bounces. */
+/* 10: 1.2 (1 + .3), .8 (1 + .6), .4 (1 + .9). 11: .5 (1 - .8^6)/.2, 1 (1 - .5^6)/.5, 2 (1 - .2^6)/.8. 14: the series' closed
+ * form, 20 bounces. */
 TEST(furnace_images_are_flat)
 {
     const struct {
@@ -96,6 +97,7 @@ TEST(furnace_images_are_flat)
         double expected[3];
     } furnace[] = {
         {"10_furnace_one", {1.56, 1.28, 0.76}},
+        {"11_furnace", {1.84464, 1.96875, 2.49984}},
         {"14_furnace_deep",
          {0.1 * (1 - gsl_pow_int(0.95, 21)) / 0.05, 0.15 * (1 - gsl_pow_int(0.9, 21)) / 0.1,
           0.3 * (1 - gsl_pow_int(0.8, 21)) / 0.2}}};
