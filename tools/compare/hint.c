@@ -13,9 +13,7 @@ enum {
     ENOUGH_TO_FIT = 1 << 15, /* pixels */
     ENOUGH = 1 << 18,
     GRID = 16, /* amounts that are tried first, either way; of shifts pixels */
-    REFINE = 20,
-    REACH = GRID + 2, /* of a shift and of what lies between pixels */
-    STRIP = BLOCK + 2 * REACH
+    REFINE = 20
 };
 static const double enough_removed = 0.9, certain = 5 /* standard errors of noise alone */;
 
@@ -24,13 +22,10 @@ struct value {
     double mean, var;
 };
 
-/* A sample of blocks that stands for the whole image: their pixels in A and B, block after block, and, where a shift by
- * many amounts is tried, strips of B that hold what it may bring in. */
+/* A sample of blocks that stands for the whole image: their pixels in A and B, block after block. */
 struct sample {
     int step; /* each step-th block */
     struct value (*side[2])[3];
-    struct value (*strips)[STRIP * BLOCK]
-                          [3]; /* each block's, pixels along the shift and then across; or NULL */
 };
 
 struct images {
@@ -81,50 +76,37 @@ static struct value value_of(const struct images *m, int side, size_t i)
 struct change {
     enum error_mode_kind kind;
     double amount, factor; /* its exponential */
-    const struct sample *sample;
 };
 
-/* B `along` pixels from the left or top in the strip of block number k, or where there are no strips. */
-static const struct value *strip_at(const struct images *m, const struct change *how, size_t k,
-                                    int along, int x, int y, struct value room[3])
-{
-    const bool down = how->kind == ERROR_SHIFT_Y;
-    const int origin = (down ? y : x) / BLOCK * BLOCK - REACH, across = (down ? x : y) % BLOCK;
-    if (how->sample->strips != NULL)
-        return how->sample->strips[k][(along - origin) * BLOCK + across];
-    const size_t i = down ? at(m, x, along) : at(m, along, y);
-    for (size_t c = 0; c < 3; c++)
-        room[c] = value_of(m, 1, i + c);
-    return room;
-}
-
 /* B between two pixels. False where it would come from beyond the border. */
-static bool shifted(const struct images *m, const struct change *how, size_t k, int x, int y,
+static bool shifted(const struct images *m, const struct change *how, int x, int y,
                     struct value out[3])
 {
     const bool down = how->kind == ERROR_SHIFT_Y;
     double from = (down ? y : x) - how->amount, low = floor(from), share = from - low;
     int last = (down ? m->side[1]->height : m->side[1]->width) - 1, i = (int)low;
-    struct value room[2][3];
     if (from < 0 || from > last)
         return false;
-    const struct value *p = strip_at(m, how, k, i, x, y, room[0]),
-                       *q = strip_at(m, how, k, i < last ? i + 1 : i, x, y, room[1]);
-    for (size_t c = 0; c < 3; c++)
-        out[c] = (struct value){(1 - share) * p[c].mean + share * q[c].mean,
-                                (1 - share) * (1 - share) * p[c].var + share * share * q[c].var};
+    const int next = i < last ? i + 1 : i;
+    const size_t near = down ? at(m, x, i) : at(m, i, y),
+                 far = down ? at(m, x, next) : at(m, next, y);
+    for (size_t c = 0; c < 3; c++) {
+        const struct value p = value_of(m, 1, near + c), q = value_of(m, 1, far + c);
+        out[c] = (struct value){(1 - share) * p.mean + share * q.mean,
+                                (1 - share) * (1 - share) * p.var + share * share * q.var};
+    }
     return true;
 }
 
-/* B, changed: mean and variance. `own`: what it was; k: number of its block in the sample. */
-static bool changed(const struct images *m, const struct change *how, size_t k, int x, int y,
+/* B, changed: mean and variance. `own`: what it was. */
+static bool changed(const struct images *m, const struct change *how, int x, int y,
                     const struct value own[3], struct value out[3])
 {
     static const size_t from[NUM_ERROR_MODES][3] = {
         [ERROR_SWAP_RB] = {2, 1, 0}, [ERROR_SWAP_RG] = {1, 0, 2}, [ERROR_SWAP_GB] = {0, 2, 1}};
     const enum error_mode_kind kind = how->kind;
     if (kind == ERROR_SHIFT_X || kind == ERROR_SHIFT_Y)
-        return shifted(m, how, k, x, y, out);
+        return shifted(m, how, x, y, out);
     bool swaps = kind >= ERROR_SWAP_RB && kind <= ERROR_SWAP_GB;
     bool moves = kind >= ERROR_FLIP_X && kind <= ERROR_TRANSPOSE;
     size_t p = source(m, kind, x, y);
@@ -148,9 +130,9 @@ static bool changed(const struct images *m, const struct change *how, size_t k, 
     return true;
 }
 
-/* Block number k of the sample, whose first pixel is number *first; then that of the next. */
-static void add_block(const struct images *m, const struct change *how, size_t k, int column,
-                      int row, size_t *first, struct excess *out)
+/* The block whose first pixel is number *first of the sample; then that of the next. */
+static void add_block(const struct images *m, const struct change *how, const struct sample *s,
+                      int column, int row, size_t *first, struct excess *out)
 {
     struct excess e = *out; /* in registers */
     const double *weight = m->weight + 3 * ((size_t)row * (size_t)m->columns + (size_t)column);
@@ -158,11 +140,11 @@ static void add_block(const struct images *m, const struct change *how, size_t k
     int num = 0;
     for (int y = row * BLOCK; y < (row + 1) * BLOCK && y < m->side[0]->height; y++)
         for (int x = column * BLOCK; x < (column + 1) * BLOCK && x < m->side[0]->width; x++) {
-            const struct value *a = how->sample->side[0][*first], *b = how->sample->side[1][*first];
+            const struct value *a = s->side[0][*first], *b = s->side[1][*first];
             struct value new[3];
             e.of++;
             ++*first;
-            if (!changed(m, how, k, x, y, b, new))
+            if (!changed(m, how, x, y, b, new))
                 continue;
             num++;
             for (size_t c = 0; c < 3; c++) {
@@ -190,29 +172,24 @@ static void add_block(const struct images *m, const struct change *how, size_t k
 static struct excess measure(const struct images *m, enum error_mode_kind kind, double amount,
                              const struct sample *s)
 {
-    const struct change how = {kind, amount, exp(amount), s};
+    const struct change how = {kind, amount, exp(amount)};
     struct excess e = {.of = 0};
-    size_t first = 0, k = 0;
+    size_t first = 0;
     for (int block = s->step / 2; block < m->columns * m->rows; block += s->step)
-        add_block(m, &how, k++, block % m->columns, block / m->columns, &first, &e);
+        add_block(m, &how, s, block % m->columns, block / m->columns, &first, &e);
     return e;
-}
-
-/* At most. */
-static size_t blocks_of(const struct images *m, const struct sample *s)
-{
-    return (size_t)m->columns * (size_t)m->rows / (size_t)s->step + 1;
 }
 
 static bool open_sample(const struct images *m, size_t enough, struct sample *s)
 {
     const size_t pixels = (size_t)m->side[0]->width * (size_t)m->side[0]->height;
     s->step = 1 + (int)(pixels / enough);
-    const size_t blocks = blocks_of(m, s);
-    s->side[0] = malloc(2 * blocks * BLOCK * BLOCK * sizeof *s->side[0]);
+    const size_t most =
+        ((size_t)m->columns * (size_t)m->rows / (size_t)s->step + 1) * BLOCK * BLOCK;
+    s->side[0] = malloc(2 * most * sizeof *s->side[0]);
     if (s->side[0] == NULL)
         return false;
-    s->side[1] = s->side[0] + blocks * BLOCK * BLOCK;
+    s->side[1] = s->side[0] + most;
     size_t first = 0;
     for (int block = s->step / 2; block < m->columns * m->rows; block += s->step) {
         const int left = block % m->columns * BLOCK, top = block / m->columns * BLOCK;
@@ -223,29 +200,6 @@ static bool open_sample(const struct images *m, size_t enough, struct sample *s)
                         s->side[side][first][c] = value_of(m, side, at(m, x, y) + c);
     }
     return true;
-}
-
-/* Of the blocks of a sample, for shifts of one kind. */
-static bool open_strips(const struct images *m, enum error_mode_kind kind, struct sample *s)
-{
-    const bool down = kind == ERROR_SHIFT_Y;
-    const int last = (down ? m->side[1]->height : m->side[1]->width) - 1;
-    size_t k = 0;
-    s->strips = malloc(blocks_of(m, s) * sizeof *s->strips);
-    for (int block = s->step / 2; s->strips != NULL && block < m->columns * m->rows;
-         block += s->step, k++) {
-        const int left = block % m->columns * BLOCK, top = block / m->columns * BLOCK;
-        for (int along = 0; along < STRIP; along++)
-            for (int across = 0; across < BLOCK; across++) {
-                int i = (down ? top : left) - REACH + along, j = (down ? left : top) + across;
-                if (i < 0 || i > last || j >= (down ? m->side[1]->width : m->side[1]->height))
-                    continue;
-                for (size_t c = 0; c < 3; c++)
-                    s->strips[k][along * BLOCK + across][c] =
-                        value_of(m, 1, (down ? at(m, j, i) : at(m, i, j)) + c);
-            }
-    }
-    return s->strips != NULL;
 }
 
 static double standard_errors(const struct excess *e, int k)
@@ -270,7 +224,7 @@ static double removed_by(const struct images *m, enum error_mode_kind kind, doub
 }
 
 /* The amount that removes most: on a grid, then between its neighbours by thirds. */
-static bool fit(const struct images *m, enum error_mode_kind kind, double *amount)
+static double fit(const struct images *m, enum error_mode_kind kind)
 {
     static const double reach[NUM_ERROR_MODES] = {[ERROR_SCALE] = 2,
                                                   [ERROR_OFFSET] = 1,
@@ -278,11 +232,8 @@ static bool fit(const struct images *m, enum error_mode_kind kind, double *amoun
                                                   [ERROR_SHIFT_X] = GRID,
                                                   [ERROR_SHIFT_Y] = GRID};
     double step = reach[kind] / GRID, best = 0, most = -INFINITY;
-    struct sample few = m->few;
-    if ((kind == ERROR_SHIFT_X || kind == ERROR_SHIFT_Y) && !open_strips(m, kind, &few))
-        return false;
     for (int k = -GRID; k <= GRID; k++) {
-        double r = removed_by(m, kind, k * step, &few);
+        double r = removed_by(m, kind, k * step, &m->few);
         if (r > most) {
             most = r;
             best = k * step;
@@ -291,14 +242,12 @@ static bool fit(const struct images *m, enum error_mode_kind kind, double *amoun
     double lo = best - step, hi = best + step;
     for (int i = 0; i < REFINE; i++) {
         double third = (hi - lo) / 3;
-        if (removed_by(m, kind, lo + third, &few) < removed_by(m, kind, hi - third, &few))
+        if (removed_by(m, kind, lo + third, &m->few) < removed_by(m, kind, hi - third, &m->few))
             lo += third;
         else
             hi -= third;
     }
-    free(few.strips);
-    *amount = (lo + hi) / 2;
-    return true;
+    return (lo + hi) / 2;
 }
 
 static struct hint describe(enum error_mode_kind kind, double amount, double share)
@@ -376,7 +325,6 @@ static const enum error_mode_kind order[NUM_ERROR_MODES] = {
 struct trials {
     const struct images *images;
     double amount[NUM_ERROR_MODES], share[NUM_ERROR_MODES];
-    bool ok[NUM_ERROR_MODES];
 };
 
 static void try(void *ctx, size_t first, size_t last)
@@ -384,14 +332,10 @@ static void try(void *ctx, size_t first, size_t last)
     struct trials *t = ctx;
     const struct images *m = t->images;
     for (size_t i = first; i < last; i++) {
-        t->share[i] = 0;
-        t->amount[i] = 0;
-        t->ok[i] = true;
         if (order[i] == ERROR_TRANSPOSE && m->side[0]->width != m->side[0]->height)
             continue;
-        t->ok[i] = !error_mode_has_amount(order[i]) || fit(m, order[i], &t->amount[i]);
-        if (t->ok[i])
-            t->share[i] = fmin(1, removed_by(m, order[i], t->amount[i], &m->many));
+        t->amount[i] = error_mode_has_amount(order[i]) ? fit(m, order[i]) : 0;
+        t->share[i] = fmin(1, removed_by(m, order[i], t->amount[i], &m->many));
     }
 }
 
@@ -407,13 +351,11 @@ bool hint_add(const struct moments *a, const struct moments *b, int threads, str
     bool ok = open_images(a, b, &m);
     if (ok)
         parallel_for(threads, NUM_ERROR_MODES, try, &t);
-    for (int i = 0; ok && i < NUM_ERROR_MODES; i++) {
-        ok = t.ok[i];
-        if (ok && t.share[i] >= most + clearly) {
+    for (int i = 0; ok && i < NUM_ERROR_MODES; i++)
+        if (t.share[i] >= most + clearly) {
             most = t.share[i];
             c->hint = describe(order[i], t.amount[i], t.share[i]);
         }
-    }
     close_images(&m);
     if (!ok)
         return err_set(e, "out of memory for the hint of %d x %d pixels", a->width, a->height);
