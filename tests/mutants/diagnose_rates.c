@@ -295,8 +295,7 @@ static bool render_singles(const struct rate_image *r, struct pool *p, const cha
     const struct suite_scene *found;
     const struct suite_variant *variant;
     work_dir(r, 0, dir);
-    const struct path image = fs_path("%s/single.exr", dir);
-    const struct path log = fs_path("%s/single.log", dir);
+    const struct path files = fs_path("%s/single", dir);
     if (!catalogue_view_scene(v, &r->suite, &found, &variant, e))
         return false;
     struct suite_scene scene = *found;
@@ -309,8 +308,7 @@ static bool render_singles(const struct rate_image *r, struct pool *p, const cha
                                            .seed = 900000 + (uint64_t)k,
                                            .threads = 1,
                                            .timeout_s = 600,
-                                           .image = image.s,
-                                           .log = log.s};
+                                           .files = files.s};
         double cpu_s;
         if (!run_pathtracer(&job, &p->single[k], &cpu_s, NULL, e))
             return false;

@@ -9,7 +9,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 const char *const converge_engine_names[] = {
     "pathtracer",
@@ -32,8 +31,7 @@ static bool render_by_pathtracer(const struct converge_job *job, const char *sam
                                  uint32_t seed, struct moments *out, double *cpu_s, struct err *e)
 {
     const char *const options[] = {"--sampler", sampler, NULL};
-    const struct path path = fs_path("%s/pathtracer.exr", job->dir);
-    const struct path log = fs_path("%s/pathtracer.log", job->dir);
+    const struct path files = fs_path("%s/pathtracer", job->dir);
     const struct pathtracer_job ours = {.program = job->pathtracer,
                                         .scene = job->scene,
                                         .spp = spp,
@@ -41,12 +39,8 @@ static bool render_by_pathtracer(const struct converge_job *job, const char *sam
                                         .options = options,
                                         .threads = job->threads,
                                         .timeout_s = job->timeout_s,
-                                        .image = path.s,
-                                        .log = log.s};
-    bool ok = run_pathtracer(&ours, out, cpu_s, NULL, e);
-    unlink(path.s);
-    unlink(log.s);
-    return ok;
+                                        .files = files.s};
+    return run_pathtracer(&ours, out, cpu_s, NULL, e);
 }
 
 static bool render_ours(const struct converge_job *job, enum converge_engine engine, int rung,

@@ -5,7 +5,6 @@
 #include "tools/validate/run_pathtracer.h"
 
 #include <stdlib.h>
-#include <unistd.h>
 
 enum { FEWEST_CONSISTENT = 4 };
 
@@ -17,8 +16,7 @@ static bool render_one(const struct diagnose_job *job, int k, struct moments *ou
     struct suite_scene scene = *job->scene;
     scene.width = job->width;
     scene.height = job->height;
-    const struct path image = fs_path("%s/diagnose.exr", job->work_dir);
-    const struct path log = fs_path("%s/diagnose.log", job->work_dir);
+    const struct path files = fs_path("%s/diagnose", job->work_dir);
     const struct pathtracer_job ours = {.program = job->program,
                                         .scene = &scene,
                                         .spp = job->spp,
@@ -28,13 +26,9 @@ static bool render_one(const struct diagnose_job *job, int k, struct moments *ou
                                                                           : NULL,
                                         .threads = job->threads,
                                         .timeout_s = job->timeout_s,
-                                        .image = image.s,
-                                        .log = log.s};
+                                        .files = files.s};
     double cpu_s;
-    bool ok = run_pathtracer(&ours, out, &cpu_s, NULL, e) || err_prefix(e, "%s", job->scene->name);
-    unlink(image.s);
-    unlink(log.s);
-    return ok;
+    return run_pathtracer(&ours, out, &cpu_s, NULL, e) || err_prefix(e, "%s", job->scene->name);
 }
 
 /* A black image has no noise to judge; that it is black is for others to find. */

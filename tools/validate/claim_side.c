@@ -5,13 +5,11 @@
 #include "reference/truth/truth.h"
 #include "renderer/base/fs.h"
 #include "renderer/base/progress.h"
-#include "run_pathtracer.h"
 
 #include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include <unistd.h>
 
 /* Error rates were measured from 16 samples on; an engine's start costs more than a few replicates. */
 enum { LEAST_SAMPLES = 16, LEAST_REPLICATES = 8 };
@@ -117,16 +115,15 @@ double side_cost(const struct side *s, int look)
     return n * samples * s->scene->width * s->scene->height;
 }
 
-/* data/scene/name[_filter][_fresh][_n].ending */
-static void file_of(const struct validation *v, const struct side *s, int stage, int look,
-                    const char *ending, char file[256])
+/* data/scene/name[_filter][_fresh][_n] */
+static struct path stem_of(const struct validation *v, const struct side *s, int stage, int look)
 {
     char n[16] = "";
     if (v->sequence != &alpha_spending_single && side_grows(s))
         snprintf(n, sizeof n, "_%d", side_count(s, look));
     bool filtered = s->scene->filter.radius > 0 && s->kind != SIDE_ENGINE;
-    snprintf(file, 256, "data/%s/%s%s%s%s.%s", s->scene->name, s->name, filtered ? "_filter" : "",
-             stage > 0 && s->kind != SIDE_TRUTH ? "_fresh" : "", n, ending);
+    return fs_path("data/%s/%s%s%s%s", s->scene->name, s->name, filtered ? "_filter" : "",
+                   stage > 0 && s->kind != SIDE_TRUTH ? "_fresh" : "", n);
 }
 
 static struct path full_path(const struct validation *v, const char *file)
@@ -143,12 +140,9 @@ static double program_time(const struct validation *v)
 static bool render_ours(const struct validation *v, const struct side *s, int stage, int look,
                         int first, struct side_image *out, struct err *e)
 {
-    char file[256];
     bool keep = first == 0 && v->sequence == &alpha_spending_single;
-    file_of(v, s, stage, look, "log", file);
-    const struct path log = full_path(v, file);
-    file_of(v, s, stage, look, keep ? "exr" : "part.exr", file);
-    const struct path path = full_path(v, file);
+    const struct path files =
+        full_path(v, fs_path("%s%s", stem_of(v, s, stage, look).s, keep ? "" : ".part").s);
     const struct pathtracer_job job = {.program = v->opt->pathtracer,
                                        .scene = s->scene,
                                        .first = first,
@@ -157,16 +151,12 @@ static bool render_ours(const struct validation *v, const struct side *s, int st
                                        .options = s->variant != NULL ? s->variant->options : NULL,
                                        .threads = v->opt->threads,
                                        .timeout_s = program_time(v),
-                                       .image = path.s,
-                                       .log = log.s};
-    if (!fs_make_parent_dirs(path.s, e) ||
+                                       .files = files.s,
+                                       .keep = keep};
+    if (!fs_make_parent_dirs(files.s, e) ||
         !run_pathtracer(&job, &out->m, &out->seconds, &out->rays, e))
         return false;
     out->written = keep;
-    if (!keep) {
-        unlink(path.s);
-        unlink(log.s);
-    }
     return true;
 }
 
@@ -195,9 +185,8 @@ static bool render_engine(const struct validation *v, const struct side *s, int 
                                       .threads = o->threads,
                                       .timeout_s = program_time(v),
                                       .work_dir = o->out_dir};
-    char file[256];
-    file_of(v, s, stage, LOOK_DECLARED, "json", file);
-    const struct path path = full_path(v, file);
+    const struct path path =
+        full_path(v, fs_path("%s.json", stem_of(v, s, stage, LOOK_DECLARED).s).s);
     if (!engine_render(o->engine, s->scene, &eo, &out->m, &out->manifest, e))
         return false;
     return fs_make_parent_dirs(path.s, e) && json_write(path.s, out->manifest, e);
@@ -308,13 +297,13 @@ enum fetch_result side_at(struct validation *v, struct side *s, int stage, int l
     return FETCH_OK;
 }
 
-bool side_write(const struct validation *v, struct side *s, int stage, int look, char file[256],
+bool side_write(const struct validation *v, struct side *s, int stage, int look, struct path *file,
                 struct err *e)
 {
     struct side_image *o = s->kind == SIDE_TRUTH ? &s->at[0][0] : &s->at[stage][slot(s, look)];
     assert(o->present);
-    file_of(v, s, stage, look, "exr", file);
-    const struct path path = full_path(v, file);
+    *file = fs_path("%s.exr", stem_of(v, s, stage, look).s);
+    const struct path path = full_path(v, file->s);
     if (!o->written &&
         !(fs_make_parent_dirs(path.s, e) && moments_write(path.s, &o->m, NULL, 0, e)))
         return false;

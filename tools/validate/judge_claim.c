@@ -118,11 +118,11 @@ static void add_provenance(json_t *claim, const struct validation *v, const stru
 
 static json_t *files_of(const struct validation *v, const struct claim_run *t, struct err *e)
 {
-    char a[256], b[256];
-    if (!side_write(v, t->a, t->stage, t->look, a, e) ||
-        !side_write(v, t->b, t->stage, t->look, b, e))
+    struct path a, b;
+    if (!side_write(v, t->a, t->stage, t->look, &a, e) ||
+        !side_write(v, t->b, t->stage, t->look, &b, e))
         return NULL;
-    json_t *files = json_pack("{s:s, s:s}", "a", a, "b", b);
+    json_t *files = json_pack("{s:s, s:s}", "a", a.s, "b", b.s);
     if (files == NULL || !write_maps(v, t, files, e)) {
         json_decref(files);
         return NULL;

@@ -162,14 +162,6 @@ static json_t *judged_row(const struct row *r)
     return j;
 }
 
-/* One that cannot be judged; `not_stored`: nothing depends on it. */
-static json_t *bare_row(const struct suite_scene *s, const char *engine, const char *why,
-                        bool not_stored)
-{
-    return json_pack("{ss,ss,sb,ss}", "scene", s->name, "engine", engine, "passed", not_stored,
-                     not_stored ? "not_stored" : "error", why);
-}
-
 /* Of a record's observations: what this look has, and what all looks would have, which says the margin. */
 struct shares {
     double seen, all;
@@ -409,10 +401,10 @@ static json_t *stored_row(const struct suite_scene *s, const char *engine, const
     const json_t *made = json_object_get(json_object_get(stored, ours[0]), "made");
     struct noise_ladder l;
     struct err e;
-    if (entry == NULL)
-        return bare_row(s, engine, "not stored: `make golden` makes it", true);
-    if (!noise_ladder_parse(entry, s, &l, &e))
-        return bare_row(s, engine, e.msg, true);
+    bool ok = entry != NULL || err_set(&e, "not stored: `make golden` makes it");
+    if (!ok || !noise_ladder_parse(entry, s, &l, &e))
+        return json_pack("{ss,ss,sb,ss}", "scene", s->name, "engine", engine, "passed", 1,
+                         "not_stored", e.msg);
     struct row r = {.scene = s,
                     .engine = engine,
                     .alpha = alpha,
@@ -459,12 +451,8 @@ json_t *noise_claims_run(const struct validate_options *opt, const struct suite_
     }
     if (!ok) {
         json_array_clear(rows);
-        bool late = progress_seconds() >= deadline;
-        json_t *row = bare_row(s, ours[0],
-                               late ? BUDGET_SPENT " before its renders were done" : e.msg, false);
-        if (late)
-            json_object_set_new(row, "verdict", json_string(verdict_name(VERDICT_INCONCLUSIVE)));
-        json_array_append_new(rows, row);
+        json_array_append_new(rows,
+                              validate_bare_row(s->name, e.msg, progress_seconds() >= deadline));
     }
     for (int k = 0; stored != NULL && engine_names[k] != NULL; k++)
         if (suite_reference_of(s, engine_names[k]) != NULL)

@@ -68,8 +68,7 @@ static bool render_rung(const struct noise_job *job, int rung, int first, int nu
     double left = job->deadline - progress_seconds();
     if (left <= 0)
         return err_set(e, "the budget is spent");
-    const struct path image = fs_path("%s/noise.exr", job->dir);
-    const struct path log = fs_path("%s/noise.log", job->dir);
+    const struct path files = fs_path("%s/noise", job->dir);
     uint64_t seed[MAX_SEEDS];
     for (int i = 0, k = first; i < num; i++, k++) {
         /* Batches of replicates, so that more of them leave the seeds of the first as they are. */
@@ -83,12 +82,8 @@ static bool render_rung(const struct noise_job *job, int rung, int first, int nu
                                         .options = job->sobol ? sobol : NULL,
                                         .threads = job->threads,
                                         .timeout_s = fmin(left / num, job->timeout_s),
-                                        .image = image.s,
-                                        .log = log.s};
-    if (!run_pathtracer_seeds(&ours, seed, num, out, cpu_s, e))
-        return false;
-    unlink(log.s);
-    return true;
+                                        .files = files.s};
+    return run_pathtracer_seeds(&ours, seed, num, out, cpu_s, e);
 }
 
 void noise_ladder_renders_free(struct noise_renders *r)

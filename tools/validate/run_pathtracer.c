@@ -26,6 +26,7 @@ static struct pathtracer_rays read_rays(const struct image *im)
 static bool run(const struct pathtracer_job *job, const char *seed, double timeout_s, double *cpu_s,
                 struct err *e)
 {
+    const struct path image = fs_path("%s.exr", job->files), log = fs_path("%s.log", job->files);
     const struct suite_scene *s = job->scene;
     char width[16], height[16], spp[16], depth[16], threads[16], lens[32], focus[32];
     char range[32], filter[PIXEL_FILTER_TEXT];
@@ -37,9 +38,9 @@ static bool run(const struct pathtracer_job *job, const char *seed, double timeo
     snprintf(lens, sizeof lens, "%.17g", s->lens_radius);
     snprintf(focus, sizeof focus, "%.17g", s->focal_distance);
     snprintf(range, sizeof range, "%d:%d", job->first, job->spp);
-    const char *argv[MAX_ARGUMENTS] = {job->program, "-r", width, height,     "-s",
-                                       spp,          "-m", depth, "-t",       threads,
-                                       "--seed",     seed, "-f",  job->image, s->dae};
+    const char *argv[MAX_ARGUMENTS] = {job->program, "-r", width, height,  "-s",
+                                       spp,          "-m", depth, "-t",    threads,
+                                       "--seed",     seed, "-f",  image.s, s->dae};
     int argc = 15;
     if (s->environment[0] != '\0') {
         argv[argc++] = "-e";
@@ -65,19 +66,24 @@ static bool run(const struct pathtracer_job *job, const char *seed, double timeo
             return err_set(e, "%s: too many options", s->name);
         argv[argc++] = *o;
     }
-    const struct process p = {.argv = argv, .log = job->log, .timeout_s = timeout_s};
+    const struct process p = {.argv = argv, .log = log.s, .timeout_s = timeout_s};
     struct process_usage usage;
     if (!process_run(&p, &usage, e))
         return false;
     *cpu_s = usage.cpu_s;
+    if (!job->keep)
+        unlink(log.s);
     return true;
 }
 
-static bool read_image(const struct suite_scene *s, const char *path, struct moments *out,
-                       struct pathtracer_rays *rays, struct err *e)
+static bool read_image(const struct suite_scene *s, const char *path, bool keep,
+                       struct moments *out, struct pathtracer_rays *rays, struct err *e)
 {
     struct image im;
-    if (!moments_read(path, out, &im, e))
+    bool ok = moments_read(path, out, &im, e);
+    if (!keep)
+        unlink(path);
+    if (!ok)
         return false;
     if (rays != NULL)
         *rays = read_rays(&im);
@@ -96,7 +102,7 @@ bool run_pathtracer(const struct pathtracer_job *job, struct moments *out, doubl
     char seed[32];
     snprintf(seed, sizeof seed, "%llu", (unsigned long long)job->seed);
     return run(job, seed, job->timeout_s, cpu_s, e) &&
-           read_image(job->scene, job->image, out, rays, e);
+           read_image(job->scene, fs_path("%s.exr", job->files).s, job->keep, out, rays, e);
 }
 
 bool run_pathtracer_seeds(const struct pathtracer_job *job, const uint64_t *seed, int num,
@@ -112,12 +118,10 @@ bool run_pathtracer_seeds(const struct pathtracer_job *job, const uint64_t *seed
     bool ok = run(job, text, num * job->timeout_s, cpu_s, e);
     while (ok && done < num) {
         const struct path image =
-            num == 1 ? fs_path("%s", job->image)
-                     : fs_path("%.*s_%llu.exr", (int)(strlen(job->image) - strlen(".exr")),
-                               job->image, (unsigned long long)seed[done]);
-        ok = read_image(job->scene, image.s, &out[done], NULL, e);
+            num == 1 ? fs_path("%s.exr", job->files)
+                     : fs_path("%s_%llu.exr", job->files, (unsigned long long)seed[done]);
+        ok = read_image(job->scene, image.s, false, &out[done], NULL, e);
         done += ok;
-        unlink(image.s);
     }
     while (!ok && done > 0)
         moments_free(&out[--done]);

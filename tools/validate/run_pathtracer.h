@@ -13,7 +13,8 @@ struct pathtracer_job {
     const char *const *options; /* further ones, NULL at the end; NULL: none */
     int threads;
     double timeout_s;
-    const char *image, *log; /* files to write; their directory exists */
+    const char *files; /* writes files.exr and files.log; their directory exists */
+    bool keep;         /* both stay; else the log does where the program fails */
 };
 
 /* What tracing took, as the image says ("assay:rays"); all 0 where it does not. The wide hierarchy counts nodes and
@@ -28,7 +29,7 @@ NODISCARD bool run_pathtracer(const struct pathtracer_job *job, struct moments *
                               struct pathtracer_rays *rays, struct err *e);
 
 /* One start for at most MAX_SEEDS seeds, each another: out[k] is of seed[k], to the bit what run_pathtracer() reads with it
- * alone. *cpu_s of all together; each has the timeout. Leaves no images. */
+ * alone. *cpu_s of all together; each has the timeout. Keeps no images. */
 NODISCARD bool run_pathtracer_seeds(const struct pathtracer_job *job, const uint64_t *seed, int num,
                                     struct moments *out, double *cpu_s, struct err *e);
 

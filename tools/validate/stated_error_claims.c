@@ -20,15 +20,15 @@ struct parts {
     char reason[128]; /* of the first of them */
 };
 
-static struct path image_path(const struct validate_options *opt, const struct suite_scene *s)
+static struct path files_of(const struct validate_options *opt, const struct suite_scene *s)
 {
-    return fs_path("%s/data/%s/consistency.exr", opt->out_dir, s->name);
+    return fs_path("%s/data/%s/consistency", opt->out_dir, s->name);
 }
 
 struct share {
     int k, first, spp; /* samples first..spp-1 of render k */
     const char *const *options;
-    bool keep; /* the image stays, for a resumed render */
+    bool keep; /* image and state stay, for a resumed render */
 };
 
 /* One render of the scene; image, log and state are removed. */
@@ -39,8 +39,7 @@ static bool render_one(const struct validate_options *opt, const struct suite_sc
     double left = deadline - progress_seconds();
     if (left <= 0)
         return err_set(e, "the budget is spent");
-    const struct path image = image_path(opt, s);
-    const struct path log = fs_path("%s/data/%s/consistency.log", opt->out_dir, s->name);
+    const struct path files = files_of(opt, s);
     const struct pathtracer_job job = {.program = opt->pathtracer,
                                        .scene = s,
                                        .first = share->first,
@@ -49,17 +48,14 @@ static bool render_one(const struct validate_options *opt, const struct suite_sc
                                        .seed = replicate_seed((uint32_t)opt->seed, share->k),
                                        .threads = opt->threads,
                                        .timeout_s = fmin(left, opt->timeout_s),
-                                       .image = image.s,
-                                       .log = log.s};
+                                       .files = files.s,
+                                       .keep = share->keep};
     double cpu_s;
-    if (!fs_make_parent_dirs(image.s, e) || !run_pathtracer(&job, out, &cpu_s, NULL, e))
+    if (!fs_make_parent_dirs(files.s, e) || !run_pathtracer(&job, out, &cpu_s, NULL, e))
         return false;
     *seconds += cpu_s;
-    if (!share->keep) {
-        unlink(image.s);
-        unlink(fs_path("%s.state", image.s).s);
-    }
-    unlink(log.s);
+    if (!share->keep)
+        unlink(fs_path("%s.exr.state", files.s).s);
     return true;
 }
 
@@ -69,7 +65,7 @@ static bool judge_parts(const struct validate_options *opt, const struct suite_s
                         double *seconds, struct err *e)
 {
     const int cut = s->consistency.parts, all = s->consistency.spp;
-    const struct path image = image_path(opt, s);
+    const struct path image = fs_path("%s.exr", files_of(opt, s).s);
     const char *const keep[] = {"--keep-state", NULL}, *const resume[] = {"--resume", image.s,
                                                                           NULL};
     struct moments first, rest;
@@ -234,11 +230,6 @@ json_t *stated_error_run(const struct validate_options *opt, const struct suite_
     for (int k = 0; k < done; k++)
         moments_free(&render[k]);
     free(render);
-    if (!ok && progress_seconds() >= deadline)
-        return json_pack("{ss,ss,sb,ss,ss}", "scene", s->name, "engine", "pathtracer", "passed", 0,
-                         "verdict", verdict_name(VERDICT_INCONCLUSIVE), "error",
-                         BUDGET_SPENT " before its renders were done");
     return ok ? judged(s, alpha, &f, seconds)
-              : json_pack("{ss,ss,sb,ss}", "scene", s->name, "engine", "pathtracer", "passed", 0,
-                          "error", e.msg);
+              : validate_bare_row(s->name, e.msg, progress_seconds() >= deadline);
 }

@@ -3,6 +3,7 @@
 #ifndef ASSAY_VALIDATE_INTERNAL_H
 #define ASSAY_VALIDATE_INTERNAL_H
 
+#include "renderer/base/fs.h"
 #include "renderer/image/moments.h"
 #include "run_pathtracer.h"
 #include "tools/sequential/alpha_spending.h"
@@ -113,9 +114,9 @@ double side_cost(const struct side *s, int look);
 /* The image of a stream at a look, rendered as far as it is missing. */
 enum fetch_result side_at(struct validation *v, struct side *s, int stage, int look,
                           struct side_image **out);
-/* Writes it for the report, once; file, relative to out_dir, has 256 characters. */
+/* Writes it for the report, once; *file is relative to out_dir. */
 NODISCARD bool side_write(const struct validation *v, struct side *s, int stage, int look,
-                          char file[256], struct err *e);
+                          struct path *file, struct err *e);
 void side_free(struct side *s);
 
 /* Does --only want any, does it want all of a scene's claims? */
@@ -136,6 +137,9 @@ void claim_run_give_up(struct validation *v, struct claim_run *t, const char *wh
 /* DIFFERENT where EQUIVALENT should be. */
 bool claim_run_differs(const struct claim_run *t);
 void claim_run_free(struct claim_run *t);
+
+/* A row of pathtracer's that is not judged: for that error, or, `late`, because its renders were not done in time. */
+json_t *validate_bare_row(const char *scene, const char *error, bool late);
 
 /* Renders the scene as its consistency asks, below out_dir, and judges. A new reference; NULL only out
  * of memory. deadline: of progress_seconds(), or INFINITY; what is not done by then is INCONCLUSIVE, with

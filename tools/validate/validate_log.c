@@ -1,6 +1,7 @@
 #include "validate_internal.h"
 
 #include "renderer/base/progress.h"
+#include "tools/results/results.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -21,4 +22,11 @@ void validate_log(struct validation *v, const char *scene, const char *what)
                 v->opt->budget_s);
     fprintf(stderr, "] %s: %s\n", scene, what);
     pthread_mutex_unlock(&v->lock);
+}
+
+json_t *validate_bare_row(const char *scene, const char *error, bool late)
+{
+    return json_pack("{ss,ss,sb,ss*,ss}", "scene", scene, "engine", "pathtracer", "passed", 0,
+                     "verdict", late ? verdict_name(VERDICT_INCONCLUSIVE) : NULL, "error",
+                     late ? BUDGET_SPENT " before its renders were done" : error);
 }
