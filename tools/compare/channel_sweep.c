@@ -87,7 +87,7 @@ static bool sweep_band(const struct judge *j, const struct moments *a, const str
     const bool directed = s->channel == CHANNEL_LUMINANCE && s->root[0] != NULL;
     if (directed)
         matched_filter_add(j, &s->directed, y, a->height, s->root);
-    if (!pyramid_rebuild(a, b, s->channel, directed ? s->root : NULL, j->opt.tile, p, e))
+    if (!pyramid_build(a, b, s->channel, directed ? s->root : NULL, j->opt.tile, p, e))
         return false;
     for (int l = p->tile_level - 1; l >= 0; l--)
         scan(j, p, l, y, l, s);

@@ -22,7 +22,7 @@ NODISCARD bool matched_filter_open(const struct moments *a, const struct moments
                                    struct matched_filter *out, struct err *e);
 void matched_filter_free(struct matched_filter *f);
 
-/* Rows y .. y+rows-1, which follow those before. root[i] gets, of A's and B's pixels, what pyramid_rebuild() wants. */
+/* Rows y .. y+rows-1, which follow those before. root[i] gets, of A's and B's pixels, what pyramid_build() wants. */
 void matched_filter_add(const struct judge *j, struct matched_filter *f, int y, int rows,
                         double *const root[2]);
 

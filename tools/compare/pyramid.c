@@ -18,7 +18,7 @@ struct run {
     double var_v[RUN], var_v_normal[RUN], var_k3[RUN], tolerance[RUN];
 };
 
-/* root: see pyramid_rebuild(). */
+/* root: see pyramid_build(). */
 ISA_CLONES static void estimate(const struct moments *m, bool exact, int channel, size_t first,
                                 size_t num, const double *root, struct run *r)
 {
@@ -225,8 +225,8 @@ static bool alloc_cells(struct pyramid *p, struct pyramid old, struct err *e)
     return true;
 }
 
-bool pyramid_rebuild(const struct moments *a, const struct moments *b, int channel,
-                     double *const root[2], int tile, struct pyramid *p, struct err *e)
+bool pyramid_build(const struct moments *a, const struct moments *b, int channel,
+                   double *const root[2], int tile, struct pyramid *p, struct err *e)
 {
     assert(a->width == b->width && a->height == b->height);
     const struct pyramid old = *p;
@@ -240,13 +240,6 @@ bool pyramid_rebuild(const struct moments *a, const struct moments *b, int chann
             fill_from(p, i == p->tile_level ? 0 : i - 1, i);
     }
     return true;
-}
-
-bool pyramid_build(const struct moments *a, const struct moments *b, int channel, int tile,
-                   struct pyramid *out, struct err *e)
-{
-    *out = (struct pyramid){.width = 0};
-    return pyramid_rebuild(a, b, channel, NULL, tile, out, e);
 }
 
 int pyramid_band(const struct pyramid *levels)

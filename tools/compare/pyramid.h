@@ -77,13 +77,11 @@ int pyramid_tiles(int length, int tile);
 /* The levels of an image without their cells. tile >= 1; beyond the longer side it is that side. */
 struct pyramid pyramid_levels(int width, int height, int tile);
 
-/* Same sizes. Fails only out of memory. Release with pyramid_free(). */
+/* Same sizes; in the memory of one that was built before, or is zero. root: of both sides' pixels, of luminance,
+ * sum w_c cbrt k3_c, which is most of the work, where that is known; NULL: not. Fails only out of memory. Release with
+ * pyramid_free(). */
 NODISCARD bool pyramid_build(const struct moments *a, const struct moments *b, int channel,
-                             int tile, struct pyramid *out, struct err *e);
-/* The same in the memory of one that was built before, or is zero. root: of both sides' pixels, of luminance,
- * sum w_c cbrt k3_c, which is most of the work, where that is known; NULL: not. */
-NODISCARD bool pyramid_rebuild(const struct moments *a, const struct moments *b, int channel,
-                               double *const root[2], int tile, struct pyramid *p, struct err *e);
+                             double *const root[2], int tile, struct pyramid *p, struct err *e);
 void pyramid_free(struct pyramid *p);
 
 /* The same in two parts, in less memory. An image is cut from the top into bands of so many rows, the last of up to twice as

@@ -137,10 +137,10 @@ struct verdict_p verdict_p(double log10_p)
     return p;
 }
 
-static bool rejects(const struct comparison *c, const struct compare_options *opt, int s)
+bool verdict_rejects(const struct comparison *c, int statistic, double alpha)
 {
-    const struct statistic *st = &c->statistic[s];
-    return st->num_tests > 0 && st->log10_p <= log10(opt->alpha * st->share);
+    const struct statistic *st = &c->statistic[statistic];
+    return st->num_tests > 0 && st->log10_p <= log10(alpha * st->share);
 }
 
 /* Regions say where; without one, the statistic whose p is furthest below its level. */
@@ -150,7 +150,7 @@ static void judge_different(struct comparison *c, const struct compare_options *
     size_t size = sizeof c->reason;
     int first = -1;
     for (int s = 0; s < NUM_STATISTICS; s++)
-        if (rejects(c, opt, s) &&
+        if (verdict_rejects(c, s, opt->alpha) &&
             (first < 0 || (first > STATISTIC_PYRAMID &&
                            c->statistic[s].log10_p - log10(c->statistic[s].share) <
                                c->statistic[first].log10_p - log10(c->statistic[first].share))))
@@ -187,7 +187,7 @@ void verdict_decide(struct comparison *c, const struct compare_options *opt,
 {
     bool rejected = false;
     for (int s = 0; s < NUM_STATISTICS; s++)
-        rejected = rejected || rejects(c, opt, s);
+        rejected = rejected || verdict_rejects(c, s, opt->alpha);
     c->extra_factor = 1;
     if (rejected)
         judge_different(c, opt);

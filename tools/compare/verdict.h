@@ -9,6 +9,9 @@
 void verdict_decide(struct comparison *c, const struct compare_options *opt,
                     const struct region *tiles);
 
+/* Does a statistic's smallest p reject at its share of alpha? */
+bool verdict_rejects(const struct comparison *c, int statistic, double alpha);
+
 /* "p = 3e-05"; what is smaller than anybody can mean is "p < 1e-12". */
 struct verdict_p {
     char s[24];

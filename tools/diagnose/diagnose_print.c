@@ -4,15 +4,13 @@
 
 #include <math.h>
 
-#define LN10 2.302585092994046
-
 enum { NEXT = 3 };
 /* Less than this share of the difference is not worth a look. */
 static const double least_told = 0.1;
 
 static double log10_of(double natural)
 {
-    return natural / LN10;
+    return natural / M_LN10;
 }
 
 static void print_bug(FILE *f, const struct catalogue *c, const struct candidate *k)

@@ -171,10 +171,7 @@ static bool check(const struct replicate_dir *a, const struct replicate_dir *b, 
 
 static void describe(const struct permutation_table *t, size_t r, struct permutation *out)
 {
-    out->x = t->rect[r].x;
-    out->y = t->rect[r].y;
-    out->width = t->rect[r].width;
-    out->height = t->rect[r].height;
+    out->rect = t->rect[r];
     out->channel = t->channel[r];
     double d = t->mean[0][r] - t->mean[1][r], b = fabs(t->mean[1][r]);
     out->difference = b > 0 ? fmax(-1e6, fmin(1e6, d / b)) : copysign(1e6, d);
@@ -218,8 +215,7 @@ static void decide(const struct permutation_options *opt, int num_a, int num_b, 
                    int height, struct permutation *out)
 {
     char where[96];
-    struct rect r = {out->x, out->y, out->width, out->height};
-    region_name(width, height, r, out->channel, where, sizeof where);
+    region_name(width, height, out->rect, out->channel, where, sizeof where);
     const char *kind = out->is_exhaustive ? "all" : "random";
     if (out->p <= opt->alpha) {
         out->verdict = VERDICT_DIFFERENT;
@@ -304,10 +300,9 @@ bool permutation_confirm(const struct permutation *first, const struct replicate
     if (!check(a2, b2, e))
         return false;
     struct permutation_table t;
-    struct rect rect = {first->x, first->y, first->width, first->height};
     double *largest = NULL, observed = 0;
     size_t region;
-    bool ok = permutation_table_make_one(a2, b2, rect, first->channel, &t, e);
+    bool ok = permutation_table_make_one(a2, b2, first->rect, first->channel, &t, e);
     t.sign = copysign(1, first->difference);
     ok = ok && run_labellings(&t, out, &largest, &region, &observed, e);
     if (ok) {

@@ -12,6 +12,7 @@
 #ifndef ASSAY_PERMUTATION_H
 #define ASSAY_PERMUTATION_H
 
+#include "tools/compare/pyramid.h"
 #include "tools/images/replicate_dir.h"
 
 #include "reference/suite/suite.h"
@@ -31,7 +32,8 @@ struct permutation {
     bool is_exhaustive;
     int num_regions; /* over all channels; those that never vary are left out */
     /* Where |t| is largest: */
-    int x, y, width, height, channel; /* 0..2 RGB, 3 luminance */
+    struct rect rect;
+    int channel; /* 0..2 RGB, 3 luminance */
     double t;
     double difference; /* of the means there, over that of B */
     double mdb;        /* relative, luminance of the image: found with about 95 % */

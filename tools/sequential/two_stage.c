@@ -43,12 +43,6 @@ bool two_stage_first(const struct moments *a, const struct moments *b,
     return true;
 }
 
-static bool rejected(const struct comparison *c, int s, double alpha)
-{
-    const struct statistic *st = &c->statistic[s];
-    return st->num_tests > 0 && st->log10_p <= log10(alpha * st->share);
-}
-
 /* Sums of the region's pixels, as pyramid.c makes them. */
 static struct cell cell_of(const struct moments *a, const struct moments *b, struct rect r,
                            int channel)
@@ -97,11 +91,11 @@ bool two_stage_confirm(const struct comparison *first, const struct moments *a2,
     assert(first->verdict == VERDICT_DIFFERENT);
     double stage = two_stage_alpha(opt->alpha);
     struct compare_options half = with_alpha(opt, opt->alpha / 2);
-    bool region =
-        rejected(first, STATISTIC_IMAGE, stage) || rejected(first, STATISTIC_PYRAMID, stage);
+    bool region = verdict_rejects(first, STATISTIC_IMAGE, stage) ||
+                  verdict_rejects(first, STATISTIC_PYRAMID, stage);
     int flagged = region;
     for (int s = STATISTIC_PYRAMID + 1; s < NUM_STATISTICS; s++)
-        flagged += rejected(first, s, stage);
+        flagged += verdict_rejects(first, s, stage);
     assert(flagged > 0);
     if (!compare_moments(a2, b2, &half, second, e))
         return false;
@@ -124,7 +118,7 @@ bool two_stage_confirm(const struct comparison *first, const struct moments *a2,
     /* Of the others the same test must have the smallest p again; that p stands for either sign and
      * is held against all tests of the statistic, so nothing is lost but power. */
     for (int s = STATISTIC_PYRAMID + 1; s < NUM_STATISTICS && !confirmed; s++) {
-        if (!rejected(first, s, stage))
+        if (!verdict_rejects(first, s, stage))
             continue;
         bool same = second->statistic[s].num_tests > 0 &&
                     strcmp(first->statistic[s].what, second->statistic[s].what) == 0;

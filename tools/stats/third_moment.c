@@ -61,10 +61,9 @@ static double product_at(const struct field *f, int x, int y)
 
 static void fill_variance(const struct moments *m, int c, double *v)
 {
-    bool exact = strcmp(m->unit, "exact") == 0;
     size_t pixels = (size_t)m->width * (size_t)m->height;
     for (size_t p = 0; p < pixels; p++)
-        v[p] = exact ? 0 : m->m2[3 * p + (size_t)c] / (m->n[p] * (m->n[p] - 1));
+        v[p] = moments_var_of_mean(m, p, c);
 }
 
 static void field_fill(struct field *f, const struct moments *a, const struct moments *b, int c)

@@ -62,6 +62,14 @@ static char *rerun_command(const struct validation *v, const struct claim_run *t
     return command;
 }
 
+static struct compare_options options_of(const struct claim_run *t, double alpha)
+{
+    return (struct compare_options){.alpha = alpha,
+                                    .margin_global = t->ref.margin_global,
+                                    .margin_tile = t->ref.margin_tile,
+                                    .tile = t->scene->tile};
+}
+
 static struct claim_context context(const struct validation *v, const struct claim_run *t,
                                     const char *rerun)
 {
@@ -72,10 +80,7 @@ static struct claim_context context(const struct validation *v, const struct cla
                                   .fidelity = t->ref.fidelity,
                                   .expected = t->expected,
                                   .rerun = rerun,
-                                  .opt = {.alpha = v->alpha * share,
-                                          .margin_global = t->ref.margin_global,
-                                          .margin_tile = t->ref.margin_tile,
-                                          .tile = t->scene->tile}};
+                                  .opt = options_of(t, v->alpha * share)};
 }
 
 static bool write_maps(const struct validation *v, const struct claim_run *t, json_t *files,
@@ -323,10 +328,7 @@ static const double least_noise_share = 0.1;
 static void look(struct validation *v, struct claim_run *t)
 {
     struct pair p = {.v = v, .t = t};
-    struct compare_options opt = {.alpha = v->alpha,
-                                  .margin_global = t->ref.margin_global,
-                                  .margin_tile = t->ref.margin_tile,
-                                  .tile = t->scene->tile};
+    struct compare_options opt = options_of(t, v->alpha);
     struct comparison c;
     struct err e = {""};
     int stage;

@@ -103,6 +103,13 @@ static void add_measured(json_t *j, const struct row *r)
     }
 }
 
+static void tell_claim(const struct variance_claim *c, const char *what, const char *of,
+                       char reason[256])
+{
+    snprintf(reason, 256, "%s is %.4g [%.4g, %.4g] times that of the %s, margin %.3g", what,
+             c->ratio, c->lo, c->hi, of, c->margin);
+}
+
 /* The first that differs, else the first that is undecided, and why. */
 static enum verdict overall(const struct row *r, char reason[256])
 {
@@ -122,9 +129,7 @@ static enum verdict overall(const struct row *r, char reason[256])
         for (size_t i = 0; i < sizeof all / sizeof *all; i++)
             if (all[i].c != NULL && all[i].of != NULL && all[i].c->verdict == wanted &&
                 (wanted == VERDICT_DIFFERENT || all[i].c != &r->tile)) {
-                snprintf(reason, 256, "%s is %.4g [%.4g, %.4g] times that of the %s, margin %.3g",
-                         all[i].what, all[i].c->ratio, all[i].c->lo, all[i].c->hi, all[i].of,
-                         all[i].c->margin);
+                tell_claim(all[i].c, all[i].what, all[i].of, reason);
                 return wanted;
             }
         if (r->slope_margin > 0 && r->slope_verdict == wanted) {
@@ -135,8 +140,7 @@ static enum verdict overall(const struct row *r, char reason[256])
         }
     }
     if (r->against != NULL)
-        snprintf(reason, 256, "%s is %.4g [%.4g, %.4g] times that of the %s, margin %.3g", r->what,
-                 r->image.ratio, r->image.lo, r->image.hi, r->against, r->image.margin);
+        tell_claim(&r->image, r->what, r->against, reason);
     return VERDICT_EQUIVALENT;
 }
 

@@ -97,9 +97,9 @@ TEST(test_pyramid_brute_force)
         simulate(&a, LAW_EXPONENTIAL, 1, 7, false, &seed);
         simulate(&b, LAW_EXPONENTIAL, 2, 9, false, &seed);
         for (int channel = 0; channel < 4; channel++) {
-            OWN(pyramid) p;
+            OWN(pyramid) p = {0};
             struct err e;
-            assert_true(pyramid_build(&a, &b, channel, tile, &p, &e));
+            assert_true(pyramid_build(&a, &b, channel, NULL, tile, &p, &e));
             assert_int_equal(p.level[p.tile_level].side, tile);
             assert_int_equal(p.level[0].side, 1);
             assert_true(p.level[p.num_levels - 1].nx == 1 && p.level[p.num_levels - 1].ny == 1);
@@ -155,8 +155,8 @@ TEST(test_pyramid_of_bands)
         MUST(moments_read_packed(test_path("bands.exr"), &file, &e));
         moments_free(&a);
         MUST(moments_read(test_path("bands.exr"), &a, NULL, &e));
-        OWN(pyramid) whole, above, p = {0};
-        MUST(pyramid_build(&a, &a, 3, tile, &whole, &e));
+        OWN(pyramid) whole = {0}, above, p = {0};
+        MUST(pyramid_build(&a, &a, 3, NULL, tile, &whole, &e));
         const struct pyramid levels = pyramid_levels(w, h, tile);
         MUST(pyramid_above(&levels, &above, &e));
         int band = pyramid_band(&levels), bands = h / band;
@@ -164,7 +164,7 @@ TEST(test_pyramid_of_bands)
         for (int k = 0; k < bands; k++) {
             struct moments part =
                 moments_rows(&file, k * band, k + 1 < bands ? band : h - k * band);
-            MUST(pyramid_rebuild(&part, &part, 3, NULL, tile, &p, &e));
+            MUST(pyramid_build(&part, &part, 3, NULL, tile, &p, &e));
             for (int l = 0; l < whole.num_levels && (bands == 1 || l < p.tile_level + 2); l++) {
                 const struct pyramid_level *level = &p.level[l];
                 size_t num = (size_t)level->nx * (size_t)level->ny,

@@ -173,8 +173,8 @@ TEST(test_confirm)
     assert_int_equal(second.verdict, VERDICT_DIFFERENT);
     assert_true(fabs(second.p - 1.0 / 252) < 1e-12);
     assert_int_equal(second.num_regions, 1);
-    assert_true(second.x == first.x && second.width == first.width &&
-                second.channel == first.channel);
+    assert_memory_equal(&second.rect, &first.rect, sizeof second.rect);
+    assert_int_equal(second.channel, first.channel);
     /* As large, but the other way round: not confirmed. */
     assert_true(permutation_confirm(&first, &b, &a, &opt, &second, &e));
     assert_int_equal(second.verdict, VERDICT_INCONCLUSIVE);

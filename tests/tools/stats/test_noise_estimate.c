@@ -47,9 +47,9 @@ static void paint(struct moments *m, enum noise kind, double scale, uint64_t *st
 /* Sums over the image, red. */
 static struct cell image_cell(const struct moments *a, const struct moments *b)
 {
-    OWN(pyramid) p;
+    OWN(pyramid) p = {0};
     struct err e;
-    if (!pyramid_build(a, b, 0, a->width, &p, &e))
+    if (!pyramid_build(a, b, 0, NULL, a->width, &p, &e))
         abort();
     struct cell c = p.level[p.num_levels - 1].cell[0];
     return c;
