@@ -148,27 +148,16 @@ size_t variance_ratio_shared(const struct moments *a, const struct moments *b)
     return p <= shared_level ? same : 0;
 }
 
-/* moments_var_of_mean() of samples or replicates. */
-static double var_of_mean(const struct moments *m, size_t p, size_t i)
-{
-    double n = moments_n(m, p);
-    return n < 2 ? NAN : moments_m2(m, i) / (n * (n - 1));
-}
-
 double variance_ratio_of_difference(const struct moments *a, const struct moments *b)
 {
     size_t pixels = (size_t)a->width * (size_t)a->height;
-    const bool exact[2] = {strcmp(a->unit, "exact") == 0, strcmp(b->unit, "exact") == 0};
     double largest = 0, log10_p = 0;
-    if (strcmp(a->unit, "stratified") == 0 || strcmp(b->unit, "stratified") == 0)
-        return 1;
-    for (size_t c = 0; c < 3; c++) {
+    for (int c = 0; c < 3; c++) {
         double sum = 0, num = 0;
         for (size_t p = 0; p < pixels; p++) {
-            size_t i = 3 * p + c;
-            double v =
-                (exact[0] ? 0 : var_of_mean(a, p, i)) + (exact[1] ? 0 : var_of_mean(b, p, i));
-            if (v > 0) {
+            size_t i = 3 * p + (size_t)c;
+            double v = moments_var_of_mean(a, p, c) + moments_var_of_mean(b, p, c);
+            if (v > 0) { /* and not unknown, as of stratified samples */
                 double d = moments_mean(a, i) - moments_mean(b, i);
                 sum += d * d / v;
                 num++;

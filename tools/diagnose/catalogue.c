@@ -64,10 +64,8 @@ void catalogue_mistake(const struct bug *b, char name[64])
 
 bool catalogue_same_mistake(const struct bug *a, const struct bug *b)
 {
-    char x[sizeof a->name], y[sizeof b->name];
-    catalogue_mistake(a, x);
-    catalogue_mistake(b, y);
-    return strcmp(x, y) == 0;
+    size_t n = strcspn(a->name, "-");
+    return n == strcspn(b->name, "-") && strncmp(a->name, b->name, n) == 0;
 }
 
 static bool get_facts(const json_t *list, double *fact, double *sd)

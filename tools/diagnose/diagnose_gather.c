@@ -11,12 +11,6 @@
 enum { MAX_PATH = 8192 };
 static const char ours[] = "pathtracer";
 
-/* What only a comparison with the correct renderer's noise tells. */
-static void finish(struct observation *clue)
-{
-    signature_set_spread(&clue->seen, &clue->view->correct);
-}
-
 bool diagnose_gather_program(const struct diagnose_gather_options *opt, const char *program,
                              struct observation *clue, int *num, struct err *e)
 {
@@ -40,7 +34,7 @@ bool diagnose_gather_program(const struct diagnose_gather_options *opt, const ch
             !diagnose_render(&job, opt->alpha / (2 * c->num_views), &clue[i].seen,
                              &clue[i].is_consistent, e))
             return false;
-        finish(&clue[i]);
+        signature_set_spread(&clue[i].seen, &v->correct);
     }
     *num = c->num_views;
     return true;
@@ -74,7 +68,7 @@ static bool read_image(const struct view *v, const char *path, int asked, bool i
     if (ok && clue->seen.rows != v->correct.rows)
         ok = err_set(e, "%s: width by height is not %d by %d", path, v->width, v->height);
     if (ok)
-        finish(clue);
+        signature_set_spread(&clue->seen, &v->correct);
     return ok;
 }
 

@@ -127,29 +127,22 @@ static void judge_image(const struct totals *t, int num, double alpha, struct st
 static void decide(struct stated_error *c, double margin)
 {
     double lo = 1 / (1 + margin), hi = 1 + margin;
-    if (c->pixels_hi < lo || c->pixels_lo > hi) {
-        c->verdict = VERDICT_DIFFERENT;
-        snprintf(c->reason, sizeof c->reason,
-                 "the variance between renders is %.3g [%.3g, %.3g] of what they state", c->pixels,
-                 c->pixels_lo, c->pixels_hi);
-    } else if (c->image < c->image_lo || c->image > c->image_hi) {
-        c->verdict = VERDICT_DIFFERENT;
+    bool outside = c->pixels_hi < lo || c->pixels_lo > hi;
+    bool inside = c->pixels_lo >= lo && c->pixels_hi <= hi;
+    bool dependent = !outside && (c->image < c->image_lo || c->image > c->image_hi);
+    c->verdict = outside || dependent ? VERDICT_DIFFERENT
+                 : inside             ? VERDICT_EQUIVALENT
+                                      : VERDICT_INCONCLUSIVE;
+    if (dependent)
         snprintf(c->reason, sizeof c->reason,
                  "pixels depend on each other: the image's sum has %.3g times the variance of "
                  "independent pixels (%.2g to %.2g)",
                  c->image, c->image_lo, c->image_hi);
-    } else if (c->pixels_lo >= lo && c->pixels_hi <= hi) {
-        c->verdict = VERDICT_EQUIVALENT;
+    else
         snprintf(c->reason, sizeof c->reason,
-                 "the variance between renders is %.3g [%.3g, %.3g] of what they state", c->pixels,
-                 c->pixels_lo, c->pixels_hi);
-    } else {
-        c->verdict = VERDICT_INCONCLUSIVE;
-        snprintf(c->reason, sizeof c->reason,
-                 "the variance between renders is %.3g [%.3g, %.3g] of what they state: more "
-                 "renders are needed",
-                 c->pixels, c->pixels_lo, c->pixels_hi);
-    }
+                 "the variance between renders is %.3g [%.3g, %.3g] of what they state%s",
+                 c->pixels, c->pixels_lo, c->pixels_hi,
+                 c->verdict == VERDICT_INCONCLUSIVE ? ": more renders are needed" : "");
 }
 
 bool stated_error_judge(const struct moments *render, int num, double margin, double alpha,

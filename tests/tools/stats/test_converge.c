@@ -1,7 +1,7 @@
 /* Statistics of convergence: formulas against brute force, error rates on synthetic engines whose bias,
  * slope and variance are known, and negative controls that must be flagged. Seeds and counts were fixed
  * beforehand; nothing is drawn again. */
-#include "tools/stats/convergence_rate.h"
+#include "stats_own.h"
 #include "tools/results/convergence_results.h"
 #include "tools/results/results_matrix.h"
 #include "tools/report/report.h"
@@ -14,7 +14,6 @@
 #include <gsl/gsl_cdf.h>
 #include <gsl/gsl_fit.h>
 #include <gsl/gsl_randist.h>
-#include <gsl/gsl_rng.h>
 
 enum { WIDTH = 12, HEIGHT = 12, SIZE = 3 * WIDTH * HEIGHT, K = 16, RUNGS = 5 };
 static const double ladder[RUNGS] = {1, 4, 16, 64, 256};
@@ -101,21 +100,6 @@ static void climb(gsl_rng *rng, const struct engine *g, const struct converge_re
         rung[i].cpu_s = 1;
     }
     free(images);
-}
-
-#define REFERENCE                                                                                  \
-    __attribute__((cleanup(convergence_rate_reference_free))) struct converge_reference
-static void rng_free(gsl_rng **rng)
-{
-    gsl_rng_free(*rng);
-}
-#define RNG __attribute__((cleanup(rng_free))) gsl_rng
-
-static gsl_rng *new_rng(unsigned long seed)
-{
-    gsl_rng *rng = gsl_rng_alloc(gsl_rng_mt19937);
-    gsl_rng_set(rng, seed);
-    return rng;
 }
 
 /* H0: a wrong answer has at most the probability alpha. Rejected where `wrong` or more of n would have a

@@ -1,12 +1,12 @@
 /* Variances of areas with their intervals: against brute force, then error rates on noise whose law is known, and
  * negative controls that must be found. Seeds and counts were fixed beforehand; nothing is drawn again. */
+#include "stats_own.h"
 #include "tools/stats/variance_ladder.h"
 #include "tests/support/own.h"
 #include "tests/support/test.h"
 
 #include <gsl/gsl_cdf.h>
 #include <gsl/gsl_randist.h>
-#include <gsl/gsl_rng.h>
 
 /* 3 x 2 tiles of 8: the last column, 5 wide, is one of its own, the last row, 3 high, is not. */
 enum { WIDTH = 21, HEIGHT = 19, TILE = 8, SIZE = 3 * WIDTH * HEIGHT, K = 8, SPP = 16 };
@@ -22,21 +22,6 @@ static double draw(gsl_rng *rng, enum law law)
 }
 
 static const double variance_of[] = {1, 19};
-
-#define REFERENCE                                                                                  \
-    __attribute__((cleanup(convergence_rate_reference_free))) struct converge_reference
-static void rng_free(gsl_rng **rng)
-{
-    gsl_rng_free(*rng);
-}
-#define RNG __attribute__((cleanup(rng_free))) gsl_rng
-
-static gsl_rng *new_rng(unsigned long seed)
-{
-    gsl_rng *rng = gsl_rng_alloc(gsl_rng_mt19937);
-    gsl_rng_set(rng, seed);
-    return rng;
-}
 
 static double truth(size_t i)
 {
