@@ -243,8 +243,9 @@ double region_pixel_t(const struct judge *j, const struct cell *cell, double *re
  * large to be trusted. */
 static bool raised_quantile(double skew, double alpha, double dof, double limit, double *x)
 {
-    double factor = 0;
-    for (int i = 0; i < 4; i++) {
+    double factor = 0, last = -1;
+    for (int i = 0; i < 4 && factor != last; i++) {
+        last = factor;
         *x = stats_t_quantile(alpha * exp(-factor), dof);
         factor = fmin(limit, skew_factor(skew, *x));
     }
