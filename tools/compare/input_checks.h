@@ -1,4 +1,4 @@
-/* What must hold before anything is compared (tools/docs/background/verdict.md, "Hygiene").
+/* What must hold before anything is compared (tools/docs/background/verdict.md, "Checks of the input").
  * Used by compare.c and two_stage.c. */
 #ifndef ASSAY_INPUT_CHECKS_H
 #define ASSAY_INPUT_CHECKS_H

@@ -25,9 +25,10 @@ struct traits {
     json_t *json; /* of the claims: owns the texts */
 };
 
-/* Of results.json the claims that should be EQUIVALENT, are that or DIFFERENT, and are about the program that most that
- * differ are about; those of consistency among them (a: "PROGRAM-consistency") if one of these differs. If none differs,
- * no claims, and the suite is not opened. claim_traits_free() afterwards. */
+/* Collects claims of results.json that should be EQUIVALENT, came out EQUIVALENT or DIFFERENT, and are
+ * about one program: that of most claims that differ. Claims of consistency (a: "PROGRAM-consistency")
+ * are among them if one of those differs. If no claim differs, there are none, and the suite is not
+ * opened. The caller calls claim_traits_free(). */
 NODISCARD bool claim_traits_collect(const json_t *results, const char *suite_dir,
                                     struct traits *out, struct err *e);
 void claim_traits_free(struct traits *t);

@@ -5,9 +5,10 @@
 #include "tools/exact/sign_flip.h"
 #include "tools/input/input.h"
 
-/* Judges path[0] against path[1]: two images, of any kind that input.h takes, a PNG without its curve too, or two directories
- * of equally many; or memory[], where that is not NULL. m: moments of both if both state theirs, for their stated errors, or NULL; then both need equally
- * many samples. Fails with a line where that is not so, where sizes differ, and as sign_flip_test() does. */
+/* Judges path[0] against path[1]: two images of any kind that input.h reads (a PNG also without its curve),
+ * or two directories of equally many images; or memory[], where that is not NULL. m: the moments of both,
+ * if both state them, for their stated errors; both then need equally many samples. NULL: they do not.
+ * Fails with a line if numbers or sizes differ, and as sign_flip_test() does. */
 NODISCARD bool same_program_judge(const char *const path[2],
                                   const struct input_memory *const memory[2],
                                   const struct moments *m, const struct sign_flip_options *opt,

@@ -1,4 +1,5 @@
-/* The main job: render the suite with our program, hold every scene against its references, judge. */
+/* Validation: renders the suite with the program under test, compares every scene with its references, and
+ * judges. */
 #ifndef ASSAY_VALIDATE_H
 #define ASSAY_VALIDATE_H
 

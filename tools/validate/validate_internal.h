@@ -69,7 +69,7 @@ struct claim_run {
     int next;     /* look; NUM_LOOKS: none is left */
     bool stalled; /* what is left of the budget is too short for it */
     bool begun;   /* by one of the threads that take scenes */
-    bool told;    /* the result is there for all threads to read */
+    bool told;    /* the result is published: all threads may read it */
     /* What the last look saw: the images of a and b, NULL before the first. */
     struct side_image *seen[2];
     int look, stage;
