@@ -13,12 +13,7 @@ const char *const bvh_kind_names[] = {"bruteforce", "centroid", "sah", "wide", N
 
 struct bvh *bvh_build(const struct scene *s, enum bvh_kind kind, struct err *e)
 {
-    return bvh_build_for(s, kind, ISA_AUTO, e);
-}
-
-struct bvh *bvh_build_for(const struct scene *s, enum bvh_kind kind, enum isa isa, struct err *e)
-{
-    return bvh_build_on(s, kind, isa, 1, e);
+    return bvh_build_on(s, kind, ISA_AUTO, 1, e);
 }
 
 struct bvh *bvh_build_on(const struct scene *s, enum bvh_kind kind, enum isa isa, int threads,

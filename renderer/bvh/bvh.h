@@ -26,10 +26,8 @@ struct bvh; /* opaque; refers to the scene, which must outlive it */
 /* NULL on failure (out of memory). */
 NODISCARD struct bvh *bvh_build(const struct scene *s, enum bvh_kind kind, struct err *e);
 /* The same with the instructions of BVH_WIDE chosen (it has no scalar version: ISA_SCALAR is as
- * ISA_AUTO); fails too if the machine lacks them. */
-NODISCARD struct bvh *bvh_build_for(const struct scene *s, enum bvh_kind kind, enum isa isa,
-                                    struct err *e);
-/* And on up to `threads` threads, where the kind can (BVH_WIDE): the same tree. */
+ * ISA_AUTO), and built on up to `threads` threads where the kind can (BVH_WIDE): the same tree. Fails too if the machine
+ * lacks the instructions. */
 NODISCARD struct bvh *bvh_build_on(const struct scene *s, enum bvh_kind kind, enum isa isa,
                                    int threads, struct err *e);
 void bvh_free(struct bvh *b);

@@ -14,13 +14,6 @@ void sampler_philox4x32(const uint32_t counter[4], const uint32_t key[2], int ro
     philoxv(counter[0], counter[1], counter[2], counter[3], &keys, rounds, out);
 }
 
-void sobol_point(uint32_t index, uint32_t x[4])
-{
-    sobolv(index, x);
-    for (int i = 0; i < 4; i++)
-        x[i] = vu_reverse_bits(x[i]);
-}
-
 struct sample4 sampler_draw(const struct sampler *s, uint32_t pixel, uint32_t sample,
                             uint32_t vertex, uint32_t purpose)
 {

@@ -51,14 +51,6 @@ struct sample4 sampler_get(uint64_t seed, uint32_t pixel, uint32_t sample, uint3
 struct sample4 sampler_draw(const struct sampler *s, uint32_t pixel, uint32_t sample,
                             uint32_t vertex, uint32_t purpose);
 
-/* The unscrambled point `index` of the sequence, as binary fractions (the top bit is worth 1/2).
- * Its generator matrices are I, P, U and PU: P is Pascal's triangle mod 2, so that the first two
- * are Sobol's; U is the like triangle over the field of four elements 0, 1, w, w^2 with entries
- * binomial(j, i) w^(j-i), the fields' elements written as matrices of 2 x 2 bits. All four together
- * are the sequence of [Faure82] in base 4, as [Niederreiter87] has it for prime powers; (U, PU) is
- * (I, P) with its points in another order, since U is triangular. */
-void sobol_point(uint32_t index, uint32_t x[4]);
-
 extern const char *const sampler_kind_names[]; /* by enum sampler_kind; ends with NULL */
 
 #endif

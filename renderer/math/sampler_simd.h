@@ -72,7 +72,12 @@ INLINE vu pascal_4v(vu x)
     return x;
 }
 
-/* sobol_point() with the lowest bit worth 1/2. */
+/* The unscrambled point `index` of the sequence, as binary fractions with their bits in reverse (the lowest is worth 1/2).
+ * Its generator matrices are I, P, U and PU: P is Pascal's triangle mod 2, so that the first two
+ * are Sobol's; U is the like triangle over the field of four elements 0, 1, w, w^2 with entries
+ * binomial(j, i) w^(j-i), the fields' elements written as matrices of 2 x 2 bits. All four together
+ * are the sequence of [Faure82] in base 4, as [Niederreiter87] has it for prime powers; (U, PU) is
+ * (I, P) with its points in another order, since U is triangular. */
 INLINE void sobolv(vu index, vu x[4])
 {
     x[0] = index;

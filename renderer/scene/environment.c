@@ -279,21 +279,6 @@ rgb environment_radiance(const struct environment *env, vec3 w)
     return look_up_environment(env, NULL, w, 1, NULL);
 }
 
-struct environment_sample environment_sample_direction(const struct environment *env, vec3 n,
-                                                       const float u[4])
-{
-    struct environment_sample s;
-    sample_environment_from(env, n, u, 1, &s.wi, &s.radiance, &s.pdf_w);
-    return s;
-}
-
-float environment_pdf_w(const struct environment *env, vec3 n, vec3 w)
-{
-    float pdf_w = 0;
-    look_up_environment(env, &n, w, 1, &pdf_w);
-    return pdf_w;
-}
-
 bool environment_is_hidden(const struct environment *env)
 {
     return env->kind == ENVIRONMENT_UPPER_HALF;

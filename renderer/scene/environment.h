@@ -47,18 +47,6 @@ void environment_free(struct environment *env);
 /* Radiance that arrives from direction w (unit). */
 rgb environment_radiance(const struct environment *env, vec3 w);
 
-struct environment_sample {
-    vec3 wi;
-    rgb radiance;
-    float pdf_w;
-};
-
-/* For a surface with the unit normal n. u in [0,1)^4. pdf_w is 0 if no light comes to that side. */
-struct environment_sample environment_sample_direction(const struct environment *env, vec3 n,
-                                                       const float u[4]);
-/* Per steradian, for unit w. */
-float environment_pdf_w(const struct environment *env, vec3 n, vec3 w);
-
 /* Lights rough surfaces only: neither the camera nor a mirror sees it. */
 bool environment_is_hidden(const struct environment *env);
 struct environment_parts environment_parts(const struct environment *env);

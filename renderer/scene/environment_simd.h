@@ -225,7 +225,8 @@ INLINE vf even_sky_pdf_w(const struct environment *env, vec3v n, vec3v w)
     return vf_select(vf_lt(zero, w.y), density, zero);
 }
 
-/* environment_sample_direction() for the lanes of the mask. */
+/* Directions for surfaces with the unit normals n, by u in [0,1)^4, for the lanes of the mask. pdf_w, per steradian, is 0
+ * if no light comes to that side. */
 INLINE void sample_environment_from(const struct environment *env, vec3v n, const vf u[4],
                                     unsigned mask, vec3v *wi, rgbv *radiance, vf *pdf_w)
 {

@@ -2,7 +2,6 @@
 
 #include "pixel_filter_simd.h"
 
-#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -141,12 +140,6 @@ double pixel_filter_value(const struct pixel_filter *f, double x)
     if (f->radius > 0)
         return f->top * shape(f, x);
     return fabs(x) <= 0.5;
-}
-
-float pixel_filter_sample(const struct pixel_filter *f, float u)
-{
-    assert(f->radius > 0 && u >= 0 && u < 1);
-    return filter_places(f, u);
 }
 
 double pixel_filter_sharing(const struct pixel_filter *f, int order)

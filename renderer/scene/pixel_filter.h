@@ -46,10 +46,6 @@ bool pixel_filter_is_gauss(const struct pixel_filter *f, double sigmas);
 
 /* f(x), per pixel. */
 double pixel_filter_value(const struct pixel_filter *f, double x);
-/* The point, from the centre, below which the share u in [0,1) of f lies: distributed as f is, so
- * that every sample weighs the same. Not of the box of one pixel. */
-float pixel_filter_sample(const struct pixel_filter *f, float u);
-
 /* Where pixels share samples, each of which is counted by all filters that reach it: how many times
  * the sum of the pixels' variances (order 2), or third cumulants (3), the sum over a large square
  * of pixels has, if noise is as large between pixels as on them: with s(x) the sum of all pixels'

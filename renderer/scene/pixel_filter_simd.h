@@ -5,7 +5,8 @@
 #include "pixel_filter.h"
 #include "renderer/math/simd.h"
 
-/* As pixel_filter_sample(), from the table. */
+/* The points, from the centre, below which the shares u in [0,1) of f lie, from the table: distributed as f is, so that every
+ * sample weighs the same. Not of the box of one pixel. */
 INLINE vf filter_places(const struct pixel_filter *f, vf u)
 {
     enum { MANTISSA = 23 - PIXEL_FILTER_BITS };

@@ -116,8 +116,3 @@ struct surface surface_at(const struct scene *s, uint32_t prim, const ray *r, fl
     return (struct surface){
         .p = p, .ng = n, .ns = n, .eps = coordinate_error(max_abs(sp->centre) + sp->radius)};
 }
-
-vec3 surface_origin(const struct surface *s, vec3 w)
-{
-    return leave_surface(s->p, s->ng, s->eps, w);
-}

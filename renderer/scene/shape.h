@@ -42,8 +42,4 @@ struct surface {
 struct surface surface_at(const struct scene *s, uint32_t prim, const ray *r, float t, float u,
                           float v);
 
-/* p moved off its surface by eps to the side that direction w (any length) leaves to, so that a ray
- * from there does not meet the same flat primitive again. */
-vec3 surface_origin(const struct surface *s, vec3 w);
-
 #endif

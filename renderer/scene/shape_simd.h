@@ -28,7 +28,8 @@ INLINE vec3v sphere_place(vec3v centre, vf radius, vf out, vec3v o, vec3v d, vf 
     return madv(centre, radius, n);
 }
 
-/* surface_origin() */
+/* p moved off its surface by eps to the side that direction w (any length) leaves to, so that a ray from there does not
+ * meet the same flat primitive again. */
 INLINE vec3v leave_surface(vec3v p, vec3v ng, vf eps, vec3v w)
 {
     return madv(p, vf_select(vf_lt(dotv(w, ng), vf_set(0)), -eps, eps), ng);

@@ -3,7 +3,6 @@
 #include "light_simd.h"
 #include "renderer/math/discrete.h"
 
-#include <assert.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -216,49 +215,7 @@ void light_table_free(struct light_table *t)
     free(t);
 }
 
-struct light_choice light_choose(const struct light_table *t, bool only_delta, vec3 p, vec3 n,
-                                 float u)
-{
-    const struct light_clusters *c = only_delta ? t->delta : t->all;
-    struct light_choice choice = {0};
-    float weight, all, within;
-    const int cluster = choose_cluster(c, p, n, u, &weight, &all, &u);
-    if (all > 0) {
-        choice.light = choose_in_cluster(c, cluster, &u, &within);
-        choice.probability = weight / all * within;
-    }
-    return choice;
-}
-
-float light_choice_probability(const struct light_table *t, uint32_t l, vec3 p, vec3 n)
-{
-    float weight, all, rest;
-    choose_cluster(t->all, p, n, 0, &weight, &all, &rest);
-    return chosen_probability(t->all, l, p, n, all);
-}
-
 uint32_t light_count_areas(const struct light_table *t)
 {
     return t->num_areas;
-}
-
-struct light_sample light_sample_direction(const struct light_table *t, uint32_t l, vec3 p, vec3 n,
-                                           const float u[4])
-{
-    struct light_samplev s;
-    sample_light_from(t, l, p, n, u, 1, &s);
-    return (struct light_sample){.wi = s.wi,
-                                 .distance = s.distance,
-                                 .radiance = s.radiance,
-                                 .sphere = (uint32_t)s.sphere,
-                                 .pdf_w = s.pdf_w,
-                                 .delta = s.delta != 0};
-}
-
-float light_pdf_w(const struct light_table *t, uint32_t l, uint32_t prim, vec3 p, vec3 wi, float d,
-                  const struct surface *hit)
-{
-    const struct light *light = &t->scene->lights[l];
-    assert(light->kind == LIGHT_TRIANGLES || light->kind == LIGHT_SPHERE);
-    return pdf_of_light(t, (const int32_t[]){(int32_t)l}, &prim, p, wi, d, hit->ng, 1);
 }

@@ -1,4 +1,5 @@
-/* Many lights (light_choice.h), by lanes. */
+/* Many lights (light_choice.h), by lanes: in proportion to about the irradiance (its luminance) that
+ * comes from a light; never one that sends nothing to the side of the normal. */
 #ifndef ASSAY_LIGHT_CHOICE_SIMD_H
 #define ASSAY_LIGHT_CHOICE_SIMD_H
 

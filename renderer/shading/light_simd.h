@@ -36,13 +36,15 @@ struct light_table {
     uint32_t num_areas;
 };
 
-/* struct light_sample */
+/* Samples of lights. */
 struct light_samplev {
-    vec3v wi;
-    vf distance;
-    rgbv radiance;
-    vi sphere, delta;
-    vf pdf_w;
+    vec3v wi;      /* unit, from the point to the light */
+    vf distance;   /* to the sampled place; INFINITY for directional lights and the environment */
+    rgbv radiance; /* arriving along wi; for delta lights irradiance on a plane facing wi */
+    vi sphere; /* primitive number of the light if it is a sphere seen from outside, which a shadow ray then has to
+                  ignore; else -1 */
+    vi delta; /* pdf_w is then 1 and no BSDF sample can find the light */
+    vf pdf_w; /* per steradian; 0: this sample brings no light */
 };
 
 INLINE struct light_samplev light_sample_none(void)
@@ -290,7 +292,8 @@ INLINE void as_starter(const struct scene *s, const struct light *light, const s
             vf_select(vf_lt(vf_set(0), out->pdf_w), out->pdf_w / out->distance, out->pdf_w);
 }
 
-/* Samples of light l for the lanes of the mask; the others' are of no use. */
+/* Samples of light l as seen from p, where the unit normal is n, which the environment goes by, for the lanes of the
+ * mask; the others' are of no use. u in [0,1)^4. */
 INLINE void sample_light_from(const struct light_table *t, uint32_t l, vec3v p, vec3v n,
                               const vf u[4], unsigned mask, struct light_samplev *out)
 {
@@ -324,7 +327,8 @@ INLINE void sample_light_from(const struct light_table *t, uint32_t l, vec3v p, 
     }
 }
 
-/* light_pdf_w() for the lanes of the mask; ng: the normal of the place, on primitives `prim`. */
+/* The density with which area lights would have sampled places of the normals ng on primitives `prim`, found from p along
+ * unit wi at the distances d, for the lanes of the mask. */
 INLINE vf pdf_of_light(const struct light_table *t, const int32_t light[LANES],
                        const uint32_t prim[LANES], vec3v p, vec3v wi, vf d, vec3v ng, unsigned mask)
 {

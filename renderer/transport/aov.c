@@ -1,5 +1,6 @@
 #include "aov.h"
 
+#include "renderer/scene/shape.h"
 #include "renderer/shading/fresnel.h"
 
 static rgb albedo_of(const struct material *m)

@@ -4,6 +4,7 @@
 #define ASSAY_GENERATE_SIMD_H
 
 #include "paths_simd.h"
+#include "renderer/scene/shape.h"
 #include "renderer/scene/camera_simd.h"
 #include "renderer/scene/pixel_filter_simd.h"
 #include "renderer/scene/shape_simd.h"

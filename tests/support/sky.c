@@ -42,7 +42,7 @@ static double tent(double d)
     return fmax(0, 1 - fabs(d));
 }
 
-double sky_radiance(const struct sky *s, double x, double y)
+double sky_on_map(const struct sky *s, double x, double y)
 {
     double sum = 0, inner = fmin(fmax(y, 0.5), s->height - 0.5);
     for (int j = 0; j < s->height; j++) {
@@ -59,7 +59,7 @@ double sky_radiance(const struct sky *s, double x, double y)
 double sky_seen(const struct sky *s, const double w[3])
 {
     double phi = atan2(-w[2], w[0]) + M_PI, theta = atan2(hypot(w[0], w[2]), w[1]);
-    return sky_radiance(s, phi / (2 * M_PI) * s->width, theta / M_PI * s->height);
+    return sky_on_map(s, phi / (2 * M_PI) * s->width, theta / M_PI * s->height);
 }
 
 void sky_direction(const struct sky *s, double x, double y, double w[3])
@@ -86,7 +86,7 @@ double sky_irradiance(const struct sky *s, const double n[3])
                     sky_direction(s, x, y, w);
                     double cosine = fmax(0, n[0] * w[0] + n[1] * w[1] + n[2] * w[2]);
                     if (cosine > 0)
-                        sum += wx * wy * cosine * sin(M_PI * y / s->height) * sky_radiance(s, x, y);
+                        sum += wx * wy * cosine * sin(M_PI * y / s->height) * sky_on_map(s, x, y);
                 }
     gsl_integration_glfixed_table_free(table);
     return sum * (2 * M_PI / s->width) * (M_PI / s->height);

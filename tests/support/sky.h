@@ -22,7 +22,7 @@ struct environment *sky_environment(const struct sky *s);
 /* First channel's radiance at map coordinates (x, y) in texels: sum over texels (i, j) of
  * value[i, j] tent(x - i - 1/2) tent(y - j - 1/2), periodic in x; beyond the middles of the first
  * and the last row y is that of the middle. */
-double sky_radiance(const struct sky *s, double x, double y);
+double sky_on_map(const struct sky *s, double x, double y);
 
 /* The same from the direction w, of any length. */
 double sky_seen(const struct sky *s, const double w[3]);

@@ -4,6 +4,7 @@
 #include "renderer/bvh/small_scene.h"
 #include "renderer/math/sampler.h"
 #include "renderer/scene/shape.h"
+#include "renderer/scene/shape_simd.h"
 #include "renderer/math/warp.h"
 #include "tests/support/build_scene.h"
 #include "tests/support/mesh.h"
@@ -193,7 +194,7 @@ TEST(no_self_intersection)
         frame f = frame_from_normal(at.ng);
         vec3 wi = normalize(frame_to_world(&f, local));
         struct rays r;
-        rays_set(&r, 0, (ray){surface_origin(&at, wi), wi, 0, INFINITY});
+        rays_set(&r, 0, (ray){leave_surface(at.p, at.ng, at.eps, wi), wi, 0, INFINITY});
         struct hits h;
         const uint16_t lane = 0;
         bvh_closest(bvh, &r, &lane, 1, &h, &stats);

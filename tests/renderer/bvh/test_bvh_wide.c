@@ -79,7 +79,7 @@ static int build_all(const struct scene *s, struct bvh *wide[3])
             print_message("%s\n", e.msg);
             continue;
         }
-        wide[n] = bvh_build_for(s, BVH_WIDE, isa, &e);
+        wide[n] = bvh_build_on(s, BVH_WIDE, isa, 1, &e);
         assert_non_null(wide[n]);
         n++;
     }

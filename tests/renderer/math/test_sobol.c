@@ -2,6 +2,7 @@
  * independence of its scrambles, and how fast the variance of a mean falls. All statistical tests:
  * alpha = 1e-6, seeds and n fixed, no retry. */
 #include "renderer/math/sampler.h"
+#include "renderer/math/sampler_simd.h"
 #include "tests/support/test.h"
 
 #include <gsl/gsl_cdf.h>
@@ -51,6 +52,13 @@ static uint32_t by_entries_4(uint32_t digits)
                 out ^= x << (30 - 2 * i);
         }
     return out;
+}
+
+static void sobol_point(uint32_t index, uint32_t x[4])
+{
+    sobolv(index, x);
+    for (int d = 0; d < 4; d++)
+        x[d] = vu_reverse_bits(x[d]);
 }
 
 TEST(sequence_is_as_defined)

@@ -1,6 +1,7 @@
 /* Camera files: what is refused, with the file's name, and where the rays of one that is read go. Pixel filters against their
  * closed forms. */
 #include "renderer/scene/camera.h"
+#include "renderer/scene/pixel_filter_simd.h"
 #include "tests/support/test.h"
 
 /* The lines of a file: angles and clip distances; position and target; the assignment's own idea of
@@ -208,7 +209,7 @@ TEST(filters_are_drawn_by_their_law)
         assert_string_equal(text, texts[i]);
         for (int k = 0; k < 10000; k++) {
             float u = (float)k / 10000;
-            double x = (double)pixel_filter_sample(&f, u), h = 1e-5;
+            double x = (double)filter_places(&f, u), h = 1e-5;
             if (!(fabs(share_below(&f, x) - (double)u) < 1e-6) || fabs(x) > f.radius)
                 fail_msg("%s: %g at %g, where %g lies below", text, (double)u, x,
                          share_below(&f, x));

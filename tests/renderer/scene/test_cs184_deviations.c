@@ -1,5 +1,5 @@
 /* The defects of the assignment's starter code that --starter does on purpose, against what they should come to. */
-#include "renderer/shading/light.h"
+#include "renderer/shading/light_simd.h"
 #include "renderer/scene/cs184_deviations.h"
 #include "tests/support/build_scene.h"
 #include "tests/support/own.h"
@@ -30,7 +30,8 @@ static double sampled_irradiance(const struct scene *s, vec3 p, vec3 *most)
     for (int i = 0; i < 2 * SIDE * SIDE; i++) {
         const float u[4] = {((float)(i / 2 % SIDE) + 0.5f) / SIDE,
                             ((float)(i / 2 / SIDE) + 0.5f) / SIDE, i % 2 ? 0.25f : 0.75f, 0.5f};
-        struct light_sample l = light_sample_direction(t, 0, p, v3(0, 1, 0), u);
+        struct light_samplev l;
+        sample_light_from(t, 0, p, v3(0, 1, 0), u, 1, &l);
         if (l.pdf_w > 0)
             sum += (double)(l.radiance.g * l.wi.y / l.pdf_w);
         vec3 q = mad(p, l.distance, l.wi);

@@ -1,6 +1,7 @@
 /* Environments by themselves: where a map's texels are in the sky, whether directions are chosen
  * with the density that is told, which files are taken. */
 #include "renderer/math/discrete.h"
+#include "renderer/scene/environment_simd.h"
 #include "renderer/math/sampler.h"
 #include "renderer/math/warp.h"
 #include "tests/support/sky.h"
@@ -61,6 +62,13 @@ TEST(orientation)
     environment_free(env);
 }
 
+static float pdf_w(const struct environment *env, vec3 n, vec3 w)
+{
+    float density = 0;
+    look_up_environment(env, &n, w, 1, &density);
+    return density;
+}
+
 static struct sample4 draw(uint32_t i)
 {
     return sampler_get(7, 0, i, 0, PURPOSE_LIGHT);
@@ -85,16 +93,19 @@ TEST(samples_are_what_they_say)
     for (uint32_t i = 0; i < N; i++) {
         struct sample4 u = draw(i);
         vec3 n = random_direction(i);
-        struct environment_sample e = environment_sample_direction(env, n, u.u);
-        behind += dot(e.wi, n) <= 0;
-        assert_true(fabsf(length(e.wi) - 1) < 1e-6f);
-        assert_true(e.pdf_w > 0);
-        double theta = acos((double)e.wi.y), phi = atan2(-(double)e.wi.z, e.wi.x) + M_PI;
-        double expected = sky_radiance(&s, phi / (2 * M_PI) * 64, theta / M_PI * 32);
-        assert_true(fabs((double)e.radiance.r - expected) < 1e-3 * (expected + 0.01));
-        assert_true(fabs((double)environment_radiance(env, e.wi).g - 2 * expected) <
+        vec3 wi;
+        rgb radiance;
+        float density;
+        sample_environment_from(env, n, u.u, 1, &wi, &radiance, &density);
+        behind += dot(wi, n) <= 0;
+        assert_true(fabsf(length(wi) - 1) < 1e-6f);
+        assert_true(density > 0);
+        double theta = acos((double)wi.y), phi = atan2(-(double)wi.z, wi.x) + M_PI;
+        double expected = sky_on_map(&s, phi / (2 * M_PI) * 64, theta / M_PI * 32);
+        assert_true(fabs((double)radiance.r - expected) < 1e-3 * (expected + 0.01));
+        assert_true(fabs((double)environment_radiance(env, wi).g - 2 * expected) <
                     2e-3 * (expected + 0.01));
-        other_cell += environment_pdf_w(env, n, e.wi) != e.pdf_w;
+        other_cell += pdf_w(env, n, wi) != density;
     }
     assert_true(behind < N / 15);
     assert_true(other_cell <= N / 1000);
@@ -115,7 +126,7 @@ static void expect_bins(const struct environment *env, vec3 n, double p[BINS])
                 double phi = 2 * M_PI * (i % TURNS + (b + 0.5) / FINE) / TURNS;
                 double r = sqrt(1 - y * y);
                 vec3 w = v3((float)(r * cos(phi)), (float)y, (float)(r * sin(phi)));
-                p[i] += (double)environment_pdf_w(env, n, w) * 4 * M_PI / (BINS * FINE * FINE);
+                p[i] += (double)pdf_w(env, n, w) * 4 * M_PI / (BINS * FINE * FINE);
             }
     }
 }
@@ -164,7 +175,10 @@ TEST(directions_have_their_density)
         double p[BINS], total = 0, wrong[BINS], wrong_total = 0;
         for (uint32_t i = 0; i < N; i++) {
             struct sample4 u = draw(i);
-            vec3 w = environment_sample_direction(env[k], n, u.u).wi;
+            vec3 w;
+            rgb radiance;
+            float density;
+            sample_environment_from(env[k], n, u.u, 1, &w, &radiance, &density);
             int height = (int)((1 - (double)w.y) / 2 * HEIGHTS);
             double phi = atan2((double)w.z, w.x);
             int turn = (int)((phi < 0 ? phi + 2 * M_PI : phi) / (2 * M_PI) * TURNS);
@@ -213,10 +227,10 @@ TEST(no_direction_is_left_out)
             const vec3 n = random_direction(i), w = random_direction(i + 40000);
             if (environment_radiance(env, w).r == 0)
                 continue;
-            const float pdf_w = environment_pdf_w(env, n, w);
-            if (dot(n, w) > 0 && !(pdf_w > 0))
+            const float density = pdf_w(env, n, w);
+            if (dot(n, w) > 0 && !(density > 0))
                 fail_msg("%d x %d: direction %u is left out", s.width, s.height, i);
-            left_out += !(pdf_w > 0);
+            left_out += !(density > 0);
         }
         environment_free(env);
     }
@@ -234,7 +248,7 @@ TEST(totals)
     assert_true(fabs(environment_total(half) - 2 * M_PI) < 1e-6);
     assert_true(environment_is_hidden(half) && !environment_is_hidden(all));
     assert_true(environment_radiance(half, v3(0.6f, -0.8f, 0)).r == 0);
-    assert_true(environment_pdf_w(half, v3(0.8f, 0.6f, 0), v3(0.6f, -0.8f, 0)) == 0);
+    assert_true(pdf_w(half, v3(0.8f, 0.6f, 0), v3(0.6f, -0.8f, 0)) == 0);
     environment_free(all);
     environment_free(half);
 
@@ -243,7 +257,7 @@ TEST(totals)
     double sum = 0, luminance_factor = 0.2126 * 1 + 0.7152 * 2 + 0.0722 * 3;
     for (int j = 0; j < 8 * 16; j++)
         for (int i = 0; i < 4 * 32; i++)
-            sum += sky_radiance(&s, (i + 0.5) / 4, (j + 0.5) / 8) *
+            sum += sky_on_map(&s, (i + 0.5) / 4, (j + 0.5) / 8) *
                    (cos(M_PI * j / 128) - cos(M_PI * (j + 1) / 128)) * 2 * M_PI / 128;
     assert_true(fabs(environment_total(env) / (sum * luminance_factor) - 1) < 1e-2);
     environment_free(env);

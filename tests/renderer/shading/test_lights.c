@@ -1,6 +1,7 @@
 /* Environment, spot lights and the choice among many lights, through render(), against closed forms
  * and quadrature. The z-tests are those of render_check.h; each scene has a value that a known bug
  * would give, which the same test must reject. */
+#include "renderer/shading/light_simd.h"
 #include "tests/support/render_check.h"
 #include "tests/support/sky.h"
 #include "tests/support/mesh.h"
@@ -185,7 +186,7 @@ TEST(seen_directly_and_in_mirrors)
                 io.roulette = ROULETTE_OFF;
                 struct check_result film = check_look(&s, io, 2, 256);
                 double theta = acos((double)w.y), phi = atan2(-(double)w.z, w.x) + M_PI;
-                double le = sky_radiance(&sky, phi / (2 * M_PI) * 16, theta / M_PI * 8);
+                double le = sky_on_map(&sky, phi / (2 * M_PI) * 16, theta / M_PI * 8);
                 static const double factor[NUM_VIEWS] = {1, 0.8, 0.64};
                 /* The image is 0.0003 radians wide, on which the map changes by 1e-3 at most. */
                 double expected = factor[view] * le;
@@ -339,7 +340,8 @@ TEST(triangles_of_a_mesh_lamp_by_area)
     int count[N] = {0};
     for (int i = 0; i < STEPS; i++) {
         const float u[4] = {0.3f, 0.4f, ((float)i + 0.5f) / STEPS, 0};
-        struct light_sample l = light_sample_direction(t, 0, v3(20, 0, 0), v3(0, 1, 0), u);
+        struct light_samplev l;
+        sample_light_from(t, 0, v3(20, 0, 0), v3(0, 1, 0), u, 1, &l);
         int k = (int)floorf(20 + l.wi.x * l.distance);
         assert_in_range(k, 0, N - 1);
         count[k]++;
@@ -349,6 +351,24 @@ TEST(triangles_of_a_mesh_lamp_by_area)
     for (int k = 0; k < N; k++)
         assert_near(count[k], STEPS * height[k] / all, 1.5);
     light_table_free(t);
+}
+
+/* One light for the place p with the unit normal n, by 0 <= u < 1, and with what probability. */
+static uint32_t choose_light(const struct light_clusters *c, vec3 p, vec3 n, float u,
+                             float *probability)
+{
+    float weight, all, within;
+    const int cluster = choose_cluster(c, p, n, u, &weight, &all, &u);
+    const uint32_t light = choose_in_cluster(c, cluster, &u, &within);
+    *probability = weight / all * within;
+    return light;
+}
+
+static float choice_probability(const struct light_table *t, uint32_t l, vec3 p, vec3 n)
+{
+    float weight, all, rest;
+    choose_cluster(t->all, p, n, 0, &weight, &all, &rest);
+    return chosen_probability(t->all, l, p, n, all);
 }
 
 /* At a plate's middle a lamp of each kind is chosen in proportion to its irradiance there, a closed form each: I cos/d^2,
@@ -403,23 +423,25 @@ TEST(choice_is_by_irradiance)
     }
     const vec3 p = v3(0, 0, 0);
     for (uint32_t i = 0; i < N; i++)
-        assert_near(light_choice_probability(t, i, p, up), part[i] / all, 0.01 * part[i] / all);
+        assert_near(choice_probability(t, i, p, up), part[i] / all, 0.01 * part[i] / all);
     /* As often as that, and with that probability. 65536 numbers in equal steps. */
     uint32_t count[2][N] = {{0}};
     for (int d = 0; d < 2; d++)
         for (int k = 0; k < 65536; k++) {
-            struct light_choice c = light_choose(t, d != 0, p, up, (float)k / 65536);
-            assert_true(c.light < N && c.probability > 0);
-            count[d][c.light]++;
+            float probability;
+            const uint32_t light =
+                choose_light(d != 0 ? t->delta : t->all, p, up, (float)k / 65536, &probability);
+            assert_true(light < N && probability > 0);
+            count[d][light]++;
         }
     for (uint32_t i = 0; i < N; i++) {
         bool is_delta = light_is_delta(&s.lights[i]);
-        assert_near(count[0][i] / 65536., light_choice_probability(t, i, p, up), 1e-4);
+        assert_near(count[0][i] / 65536., choice_probability(t, i, p, up), 1e-4);
         assert_near(count[1][i] / 65536., is_delta ? part[i] / delta : 0, 2e-3);
     }
     /* From below only the point light and the sun of the other side, and the sky, which is all around. */
     for (uint32_t i = 0; i < N; i++)
-        assert_int_equal(light_choice_probability(t, i, p, down) > 0, i == 2 || i == 6 || i == 8);
+        assert_int_equal(choice_probability(t, i, p, down) > 0, i == 2 || i == 6 || i == 8);
     light_table_free(t);
 }
 
@@ -467,24 +489,25 @@ TEST(no_light_is_left_out)
         double sum = 0, probability[N];
         int count[N] = {0};
         for (uint32_t l = 0; l < N; l++) {
-            sum += probability[l] = (double)light_choice_probability(t, l, p, n);
+            sum += probability[l] = (double)choice_probability(t, l, p, n);
             never += probability[l] == 0;
             for (uint32_t i = 0; i < 4; i++) {
-                const struct light_sample ls =
-                    light_sample_direction(t, l, p, n, sampler_get(12, k, l, i, 0).u);
+                struct light_samplev ls;
+                sample_light_from(t, l, p, n, sampler_get(12, k, l, i, 0).u, 1, &ls);
                 if (!(ls.pdf_w > 0 && dot(ls.wi, n) > 0 && rgb_max(ls.radiance) > 0))
                     continue;
                 found++;
                 if (probability[l] == 0)
                     fail_msg("light %u is never chosen at place %u", l, k);
-                left_out += light_choice_probability(t, l, p, neg(n)) == 0;
+                left_out += choice_probability(t, l, p, neg(n)) == 0;
             }
         }
         assert_near(sum, 1, 1e-5);
         for (int i = 0; i < STEPS; i++) {
-            struct light_choice c = light_choose(t, false, p, n, ((float)i + 0.5f) / STEPS);
-            assert_near(c.probability / probability[c.light], 1, 1e-2);
-            count[c.light]++;
+            float its;
+            const uint32_t l = choose_light(t->all, p, n, ((float)i + 0.5f) / STEPS, &its);
+            assert_near(its / probability[l], 1, 1e-2);
+            count[l]++;
         }
         for (int l = 0; l < N; l++)
             assert_near(count[l], STEPS * probability[l], 2.1);
@@ -659,14 +682,16 @@ TEST(triangles_of_a_textured_lamp_by_mean)
     const vec3 from = v3(2, 0, 0);
     for (int i = 0; i < STEPS; i++) {
         const float u[4] = {0.3f, 0.4f, ((float)i + 0.5f) / STEPS, 0};
-        struct light_sample l = light_sample_direction(t, 0, from, v3(0, 1, 0), u);
+        struct light_samplev l;
+        sample_light_from(t, 0, from, v3(0, 1, 0), u, 1, &l);
         int k = l.pdf_w > 0 ? (int)floorf(from.x + l.wi.x * l.distance) : 0;
         assert_in_range(k, 0, 3);
         count[k]++;
         if (k == 0)
             continue;
-        const struct surface hit = {.ng = {0, -1, 0}};
-        double pdf_w = (double)light_pdf_w(t, 0, (uint32_t)k, from, l.wi, l.distance, &hit);
+        const uint32_t prim = (uint32_t)k;
+        double pdf_w =
+            (double)pdf_of_light(t, (int32_t[]){0}, &prim, from, l.wi, l.distance, v3(0, -1, 0), 1);
         double d = (double)l.distance;
         assert_near((double)l.pdf_w / pdf_w, 1, 1e-5);
         assert_near(pdf_w * (2 / (4 * share[k])) / (d * d * d), 1, 1e-5);

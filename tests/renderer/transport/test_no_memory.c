@@ -4,8 +4,8 @@
 #include "renderer/bvh/bvh.h"
 #include "renderer/collada/collada.h"
 #include "renderer/pathtracer/checkpoint.h"
-#include "renderer/scene/environment.h"
 #include "renderer/scene/triangulate.h"
+#include "renderer/shading/light_simd.h"
 #include "renderer/shading/scene_simd.h"
 #include "renderer/transport/render.h"
 #include "tests/support/build_scene.h"
@@ -145,7 +145,8 @@ static bool load(const void *arg, double *digest, struct err *e)
     struct scene_simd *l = t != NULL ? scene_simd_build(&s, e) : NULL;
     *digest = s.num_triangles + 1e4 * s.num_lights + 1e7 * s.num_materials + 1e9 * s.num_spheres;
     for (uint32_t i = 0; i < s.num_lights && t != NULL; i++)
-        *digest += (double)light_choice_probability(t, i, v3(0, 0, 0), v3(0.6f, 0.8f, 0)) / (i + 2);
+        *digest +=
+            (double)chosen_probability(t->all, i, v3(0, 0, 0), v3(0.6f, 0.8f, 0), 1) / (i + 2);
     scene_simd_free(l);
     light_table_free(t);
     scene_free(&s);
@@ -171,8 +172,10 @@ static bool sky(const void *arg, double *digest, struct err *e)
         arg != NULL ? environment_read(arg, e) : environment_upper_half((rgb){1, 2, 3}, e);
     if (env == NULL)
         return false;
-    *digest =
-        environment_total(env) + (double)environment_pdf_w(env, v3(0, 1, 0), v3(0.6f, 0, 0.8f));
+    const vec3 up = v3(0, 1, 0);
+    float pdf_w = 0;
+    look_up_environment(env, &up, v3(0.6f, 0, 0.8f), 1, &pdf_w);
+    *digest = environment_total(env) + (double)pdf_w;
     environment_free(env);
     return true;
 }

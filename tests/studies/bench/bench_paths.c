@@ -85,7 +85,7 @@ static bool load_view(int i, const struct bench_options *o, struct bench_view *v
     struct err why = {""};
     v->embree = embree_tracer_new(&v->scene, &why);
     v->isa = o->isa;
-    v->bvh = bvh_build_for(&v->scene, BVH_WIDE, o->isa, e);
+    v->bvh = bvh_build_on(&v->scene, BVH_WIDE, o->isa, 1, e);
     return v->bvh != NULL;
 }
 

@@ -107,7 +107,7 @@ struct tracer tracer_ours(const struct scene *s, enum isa isa)
     struct err e = {0};
     struct tracer t = {.name = "wide", .num_triangles = s->num_triangles};
     double start = bench_cpu_seconds();
-    t.bvh = bvh_build_for(s, BVH_WIDE, isa, &e);
+    t.bvh = bvh_build_on(s, BVH_WIDE, isa, 1, &e);
     t.build_seconds = bench_cpu_seconds() - start;
     if (t.bvh == NULL) {
         fprintf(stderr, "bench: %s\n", e.msg);
