@@ -4,6 +4,39 @@
 
 #define ROUNDING 2e-5
 
+void check_aim(struct scene *s, vec3 eye, vec3 backward, vec3 up)
+{
+    build_camera(s, eye, 0.02f);
+    s->camera.backward = backward;
+    s->camera.up = up;
+    s->camera.right = cross(up, backward);
+}
+
+struct scene check_plate(vec3 n, float albedo)
+{
+    struct scene s = build_scene();
+    uint32_t m = build_material(&s, grey(albedo), grey(0));
+    frame f = frame_from_normal(n);
+    build_quad(&s, add(scale(f.s, -3), scale(f.t, -3)), scale(f.s, 6), scale(f.t, 6), m);
+    const float h = 0.70710678f;
+    check_aim(&s, add(scale(n, 2), scale(f.t, 2)), scale(add(n, f.t), h), scale(sub(n, f.t), h));
+    return s;
+}
+
+double check_irradiance(const double (*v)[3], int n)
+{
+    double sum = 0;
+    for (int i = 0; i < n; i++) {
+        const double *a = v[i], *b = v[(i + 1) % n];
+        double c[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2],
+                       a[0] * b[1] - a[1] * b[0]};
+        double lc = sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]);
+        double ab = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        sum += atan2(lc, ab) * c[1] / lc;
+    }
+    return fabs(sum) / 2;
+}
+
 void check_finish(struct scene *s)
 {
     struct err e = {""};

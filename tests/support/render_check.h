@@ -7,6 +7,15 @@
 #include "renderer/transport/render.h"
 #include "build_scene.h"
 
+/* A camera whose pinhole is so narrow that the image is one direction. */
+void check_aim(struct scene *s, vec3 eye, vec3 backward, vec3 up);
+/* A plate 6 x 6 around the origin with the unit normal n, seen at 45 degrees through such a camera: irradiance is
+ * constant over the image. */
+struct scene check_plate(vec3 n, float albedo);
+/* Irradiance at the origin, normal +Y, of a polygon of unit radiance above the horizon: Lambert's formula
+ * E = 1/2 sum_i angle(v_i, v_i+1) n . (v_i x v_i+1)/|..|, orientation by the sign. */
+double check_irradiance(const double (*v)[3], int n);
+
 /* scene_finish(), or the test fails with its line. */
 void check_finish(struct scene *s);
 

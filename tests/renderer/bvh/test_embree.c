@@ -14,6 +14,7 @@
  * few needles that are grazed. */
 #include "renderer/bvh/bvh.h"
 #include "renderer/collada/collada.h"
+#include "renderer/math/mat4.h"
 #include "renderer/math/sampler.h"
 #include "renderer/scene/shape.h"
 #include "renderer/math/warp.h"
@@ -132,55 +133,39 @@ static struct hit our_hit(const struct bvh *bvh, const ray *r)
     return (struct hit){h.prim[0] != NO_HIT, h.t[0], h.prim[0]};
 }
 
-struct dvec {
-    double x, y, z;
-};
-
-static struct dvec wide(vec3 a)
+static dvec3 wide(vec3 a)
 {
-    return (struct dvec){a.x, a.y, a.z};
+    return d3(a.x, a.y, a.z);
 }
-static struct dvec dsub(struct dvec a, struct dvec b)
+static dvec3 dmad(dvec3 a, double s, dvec3 b)
 {
-    return (struct dvec){a.x - b.x, a.y - b.y, a.z - b.z};
-}
-static struct dvec dmad(struct dvec a, double s, struct dvec b)
-{
-    return (struct dvec){a.x + s * b.x, a.y + s * b.y, a.z + s * b.z};
-}
-static double ddot(struct dvec a, struct dvec b)
-{
-    return a.x * b.x + a.y * b.y + a.z * b.z;
-}
-static struct dvec dcross(struct dvec a, struct dvec b)
-{
-    return (struct dvec){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+    return d3_sub(a, d3_scale(b, -s));
 }
 
 /* A triangle in double, seen along a ray: corners without their component along the ray. */
 struct view {
-    struct dvec q[3];
+    dvec3 q[3];
     double cosine, needle, t; /* cosine with the normal, l^2/w, distance of the plane */
 };
 
 static struct view view_along(const struct scene *s, uint32_t prim, const ray *r)
 {
     const vec3 *p = s->position + 3 * (size_t)prim;
-    struct dvec d = wide(r->d), v[3];
+    dvec3 d = wide(r->d), v[3];
     struct view w = {.cosine = 0};
     double longest = 0;
     for (int k = 0; k < 3; k++) {
-        v[k] = dsub(wide(p[k]), wide(r->o));
-        w.q[k] = dmad(v[k], -ddot(v[k], d) / ddot(d, d), d);
-        struct dvec e = dsub(wide(p[(k + 1) % 3]), wide(p[k]));
-        longest = fmax(longest, sqrt(ddot(e, e)));
+        v[k] = d3_sub(wide(p[k]), wide(r->o));
+        w.q[k] = dmad(v[k], -d3_dot(v[k], d) / d3_dot(d, d), d);
+        dvec3 e = d3_sub(wide(p[(k + 1) % 3]), wide(p[k]));
+        longest = fmax(longest, d3_length(e));
     }
-    struct dvec n = dcross(dsub(v[1], v[0]), dsub(v[2], v[0]));
-    double twice_area = sqrt(ddot(n, n));
+    dvec3 n = d3_cross(d3_sub(v[1], v[0]), d3_sub(v[2], v[0]));
+    double twice_area = d3_length(n);
     if (twice_area > 0) {
-        w.cosine = fabs(ddot(n, d)) / twice_area / sqrt(ddot(d, d));
+        w.cosine = fabs(d3_dot(n, d)) / twice_area / d3_length(d);
         w.needle = longest * longest * longest / twice_area;
-        w.t = ddot(n, v[0]) / ddot(n, d);
+        w.t = d3_dot(n, v[0]) / d3_dot(n, d);
     }
     return w;
 }
@@ -191,11 +176,11 @@ static double depth_inside(const struct view *w, const ray *r)
     double nearest = INFINITY;
     int left = 0, right = 0;
     for (int k = 0; k < 3; k++) {
-        struct dvec a = w->q[k], e = dsub(w->q[(k + 1) % 3], a);
-        double ee = ddot(e, e), along = ee > 0 ? -ddot(a, e) / ee : 0;
-        struct dvec at = dmad(a, along < 0 ? 0 : along > 1 ? 1 : along, e);
-        nearest = fmin(nearest, sqrt(ddot(at, at)));
-        double side = ddot(dcross(a, e), wide(r->d));
+        dvec3 a = w->q[k], e = d3_sub(w->q[(k + 1) % 3], a);
+        double ee = d3_dot(e, e), along = ee > 0 ? -d3_dot(a, e) / ee : 0;
+        dvec3 at = dmad(a, along < 0 ? 0 : along > 1 ? 1 : along, e);
+        nearest = fmin(nearest, d3_length(at));
+        double side = d3_dot(d3_cross(a, e), wide(r->d));
         left += side >= 0;
         right += side <= 0;
     }

@@ -15,27 +15,6 @@ static struct integrator_options paths(int direct, int depth)
     return check_options(direct, depth, 20260202);
 }
 
-static void look(struct scene *s, vec3 eye, vec3 backward, vec3 up)
-{
-    build_camera(s, eye, 0.02f);
-    s->camera.backward = backward;
-    s->camera.up = up;
-    s->camera.right = cross(up, backward);
-}
-
-/* A plate 6 x 6 around the origin with the unit normal n, seen at 45 degrees through an angle so
- * narrow that irradiance is constant over the image. */
-static struct scene plate(vec3 n, float albedo)
-{
-    struct scene s = build_scene();
-    uint32_t m = build_material(&s, grey(albedo), grey(0));
-    frame f = frame_from_normal(n);
-    build_quad(&s, add(scale(f.s, -3), scale(f.t, -3)), scale(f.s, 6), scale(f.t, 6), m);
-    const float h = 0.70710678f;
-    look(&s, add(scale(n, 2), scale(f.t, 2)), scale(add(n, f.t), h), scale(sub(n, f.t), h));
-    return s;
-}
-
 /* The scene owns it from then on. */
 static void give_sky(struct scene *s, struct environment *env)
 {
@@ -50,7 +29,7 @@ TEST(constant_sky)
 {
     struct err e;
     for (int around = 0; around < 2; around++) {
-        struct scene s = plate(v3(0, 1, 0), 0.6f);
+        struct scene s = check_plate(v3(0, 1, 0), 0.6f);
         if (around) {
             scene_free(&s);
             s = build_scene();
@@ -86,7 +65,7 @@ TEST(uneven_sky)
     const struct sky sky = sky_uneven(16, 8);
     for (int k = 0; k < 5; k++) {
         const double *n = normals[k], opposite[3] = {-n[0], -n[1], -n[2]};
-        OWN(scene) s = plate(v3((float)n[0], (float)n[1], (float)n[2]), 0.7f);
+        OWN(scene) s = check_plate(v3((float)n[0], (float)n[1], (float)n[2]), 0.7f);
         give_sky(&s, sky_environment(&sky));
         check_finish(&s);
         double expected = 0.7 / M_PI * sky_irradiance(&sky, n);
@@ -111,7 +90,7 @@ TEST(bright_texel)
 {
     struct sky sky = {.width = 32, .height = 16};
     sky.value[3 * 32 + 11] = 1000;
-    OWN(scene) s = plate(v3(0, 1, 0), 0.5f);
+    OWN(scene) s = check_plate(v3(0, 1, 0), 0.5f);
     give_sky(&s, sky_environment(&sky));
     check_finish(&s);
     double theta = 3.5 * M_PI / 16, d = M_PI / 16, azimuth = 2 * M_PI / 32;
@@ -156,12 +135,12 @@ static struct scene catalogue_view_scene(enum view view, vec3 w, float reflectan
         frame g = frame_from_normal(n);
         build_quad(&s, add(scale(g.s, -1), scale(g.t, -1)), scale(g.s, 2), scale(g.t, 2), m);
         backward = f.s;
-        look(&s, scale(f.s, 4), backward, f.t);
+        check_aim(&s, scale(f.s, 4), backward, f.t);
         return s;
     }
     case NUM_VIEWS: break;
     }
-    look(&s, v3(0, 0, 0), backward, f.t);
+    check_aim(&s, v3(0, 0, 0), backward, f.t);
     return s;
 }
 
@@ -221,7 +200,7 @@ TEST(upper_half)
     static const float normals[3][3] = {{0, 1, 0}, {1, 0, 0}, {0, -1, 0}};
     for (int k = 0; k < 3; k++)
         for (int direct = 0; direct_kind_names[direct] != NULL; direct++) {
-            OWN(scene) s = plate(v3(normals[k][0], normals[k][1], normals[k][2]), 0.7f);
+            OWN(scene) s = check_plate(v3(normals[k][0], normals[k][1], normals[k][2]), 0.7f);
             give_sky(&s, environment_upper_half(grey(2), &e));
             check_finish(&s);
             struct integrator_options io = paths(direct, 1);
@@ -290,7 +269,7 @@ TEST(spot_light)
                  {50, 90, 1.5}, {89, 90, 1}, {91, 90, 0}, {160, 90, 2}};
     const vec3 at = v3(0.6f, 0.8f, -0.5f);
     for (size_t k = 0; k < sizeof spots / sizeof *spots; k++) {
-        OWN(scene) s = plate(v3(0, 1, 0), 0.7f);
+        OWN(scene) s = check_plate(v3(0, 1, 0), 0.7f);
         frame f = frame_from_normal(normalize(neg(at)));
         float off = (float)(spots[k].off * M_PI / 180);
         vec3 axis = add(scale(f.n, cosf(off)), scale(f.t, sinf(off)));
@@ -377,7 +356,7 @@ static float choice_probability(const struct light_table *t, uint32_t l, vec3 p,
 TEST(choice_is_by_irradiance)
 {
     struct err e;
-    OWN(scene) s = plate(v3(0, 1, 0), 0.5f);
+    OWN(scene) s = check_plate(v3(0, 1, 0), 0.5f);
     const vec3 up = v3(0, 1, 0), down = v3(0, -1, 0), at = v3(1, 1, 0);
     const float falls[][3] = {{0, 0, 1}, {2, 0, 0}};
     for (int k = 0; k < 2; k++)
@@ -517,22 +496,14 @@ TEST(no_light_is_left_out)
     scene_free(&s);
 }
 
-/* Irradiance at the origin, normal +Y, of a rectangle of unit radiance at height h that faces down:
- * Lambert's formula, E = 1/2 |sum of angle times (edge normal).y| over its edges. */
+/* At the origin, of unit radiance, facing down. */
 static double rectangle_irradiance(vec3 p, float width, float depth)
 {
     const double v[4][3] = {{p.x, p.y, p.z},
                             {p.x + width, p.y, p.z},
                             {p.x + width, p.y, p.z + depth},
                             {p.x, p.y, p.z + depth}};
-    double sum = 0;
-    for (int i = 0; i < 4; i++) {
-        const double *a = v[i], *b = v[(i + 1) % 4];
-        double x = a[1] * b[2] - a[2] * b[1], y = a[2] * b[0] - a[0] * b[2],
-               z = a[0] * b[1] - a[1] * b[0], l = sqrt(x * x + y * y + z * z);
-        sum += atan2(l, a[0] * b[0] + a[1] * b[1] + a[2] * b[2]) * y / l;
-    }
-    return fabs(sum) / 2;
+    return check_irradiance(v, 4);
 }
 
 /* 60 point lights below 40 rectangular lamps that face down, of powers from 1 to 1000, over a
@@ -540,7 +511,7 @@ static double rectangle_irradiance(vec3 p, float width, float depth)
  * chosen by place, and what the renderer does by itself, which is the latter to the bit. */
 TEST(a_hundred_lights)
 {
-    OWN(scene) s = plate(v3(0, 1, 0), 0.6f);
+    OWN(scene) s = check_plate(v3(0, 1, 0), 0.6f);
     double irradiance = 0, lamps = 0, brightest = 0;
     for (int i = 0; i < 60; i++) {
         vec3 at =
@@ -628,7 +599,7 @@ TEST(textured_lamp_over_textured_plate)
     const double half[2] = {rectangle_irradiance(v3(-1, 1, -0.4f), 1.2f, 1),
                             rectangle_irradiance(v3(0.2f, 1, -0.4f), 1.2f, 1)};
     for (int many = 0; many < 2; many++) {
-        OWN(scene) s = plate(v3(0, 1, 0), 1);
+        OWN(scene) s = check_plate(v3(0, 1, 0), 1);
         s.materials[0].reflectance_map = build_texture(&s, 2, 1, ramp, false, TEXTURE_CLAMP);
         uint32_t lamp = build_material(&s, grey(0), grey(0.7f));
         s.materials[lamp].radiance_map = build_texture(&s, 2, 1, halves, true, TEXTURE_WRAP);
@@ -707,7 +678,7 @@ TEST(triangles_of_a_textured_lamp_by_mean)
 TEST(one_environment)
 {
     struct err e = {""};
-    struct scene s = plate(v3(0, 1, 0), 0.5f);
+    struct scene s = check_plate(v3(0, 1, 0), 0.5f);
     check_finish(&s);
     assert_int_equal(s.environment_light, -1);
     struct environment *first = environment_constant(grey(1), &e);
@@ -722,7 +693,7 @@ TEST(one_environment)
     check_mean(&film, 0, 0.5, "added environment");
     scene_free(&s);
 
-    s = plate(v3(0, 1, 0), 0.5f);
+    s = check_plate(v3(0, 1, 0), 0.5f);
     build_light(&s, (struct light){.kind = LIGHT_ENVIRONMENT});
     assert_false(scene_finish(&s, "test", &e));
     assert_non_null(strstr(e.msg, "light 0: more than one environment, or none"));

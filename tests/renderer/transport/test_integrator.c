@@ -38,45 +38,13 @@ TEST(furnace_at_every_depth)
         }
 }
 
-/* Irradiance at the origin, normal +Y, of a polygon of unit radiance above the horizon: Lambert's
- * formula E = 1/2 sum_i angle(v_i, v_i+1) n . (v_i x v_i+1)/|..|, orientation by the sign. */
-static double polygon_irradiance(const double (*v)[3], int n)
-{
-    double sum = 0;
-    for (int i = 0; i < n; i++) {
-        const double *a = v[i], *b = v[(i + 1) % n];
-        double c[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2],
-                       a[0] * b[1] - a[1] * b[0]};
-        double lc = sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]);
-        double ab = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-        sum += atan2(lc, ab) * c[1] / lc;
-    }
-    return fabs(sum) / 2;
-}
-
-/* A floor patch at the origin seen from a distance through a pinhole so narrow that irradiance is
- * constant over the image. */
-static struct scene floor_scene(float albedo)
-{
-    struct scene s = build_scene();
-    uint32_t m = build_material(&s, grey(albedo), grey(0));
-    build_quad(&s, v3(-3, 0, 3), v3(6, 0, 0), v3(0, 0, -6), m);
-    build_camera(&s, v3(0, 0, 0), 0.02f);
-    /* From (0, 2, 2) towards the origin. */
-    const float h = 0.70710678f;
-    s.camera.eye = v3(0, 2, 2);
-    s.camera.backward = v3(0, h, h);
-    s.camera.up = v3(0, h, -h);
-    return s;
-}
-
 TEST(rectangle_light)
 {
     /* Parallel, off axis; upright and near (grazing); both face the patch. */
     static const float quads[2][9] = {{0.2f, 1, -0.7f, 0.9f, 0, 0, 0, 0, 0.5f},
                                       {0.3f, 0.05f, 0.5f, 0, 0, -1, 0, 0.8f, 0}};
     for (int q = 0; q < 2; q++) {
-        OWN(scene) s = floor_scene(0.6f);
+        OWN(scene) s = check_plate(v3(0, 1, 0), 0.6f);
         uint32_t lamp = build_material(&s, grey(0), grey(5));
         const float *f = quads[q];
         vec3 p = v3(f[0], f[1], f[2]), u = v3(f[3], f[4], f[5]), v = v3(f[6], f[7], f[8]);
@@ -90,7 +58,7 @@ TEST(rectangle_light)
                                {p.x + u.x, p.y + u.y, p.z + u.z},
                                {p.x + u.x + v.x, p.y + u.y + v.y, p.z + u.z + v.z},
                                {p.x + v.x, p.y + v.y, p.z + v.z}};
-        double expected = 0.6 / M_PI * 5 * polygon_irradiance((const double(*)[3])corner, 4);
+        double expected = 0.6 / M_PI * 5 * check_irradiance((const double(*)[3])corner, 4);
         for (int direct = 0; direct_kind_names[direct] != NULL; direct++)
             for (int l = 1; l <= 3; l += 2) {
                 struct integrator_options io = paths(direct, 1);
@@ -110,7 +78,7 @@ TEST(sphere_light)
 {
     static const float centre[3][3] = {{0, 1, 0}, {0.8f, 0.9f, -0.3f}, {0, 0.35f, -0.2f}};
     for (int q = 0; q < 3; q++) {
-        OWN(scene) s = floor_scene(0.5f);
+        OWN(scene) s = check_plate(v3(0, 1, 0), 0.5f);
         uint32_t lamp = build_material(&s, grey(0), grey(3));
         vec3 c = v3(centre[q][0], centre[q][1], centre[q][2]);
         build_sphere(&s, c, 0.25f, 1, lamp);
@@ -129,7 +97,7 @@ TEST(sphere_light)
 /* Point: rho/pi I cos/d^2. Directional: rho/pi E cos. No noise but that of the pixel's width. */
 TEST(delta_lights)
 {
-    OWN(scene) s = floor_scene(0.7f);
+    OWN(scene) s = check_plate(v3(0, 1, 0), 0.7f);
     build_point(&s, v3(0.6f, 0.8f, -0.5f), (rgb){2, 3, 4});
     vec3 sun = normalize(v3(-1, 2, 0.5f));
     build_sun(&s, sun, (rgb){1, 0, 0.5f});
@@ -149,7 +117,7 @@ TEST(delta_lights)
 TEST(shadow)
 {
     for (int blocked = 0; blocked < 2; blocked++) {
-        OWN(scene) s = floor_scene(0.7f);
+        OWN(scene) s = check_plate(v3(0, 1, 0), 0.7f);
         uint32_t black = build_material(&s, grey(0), grey(0));
         build_quad(&s, v3(blocked ? -0.1f : 0.3f, 0.5f, -0.1f), v3(0.2f, 0, 0), v3(0, 0, 0.2f),
                    black);
