@@ -32,17 +32,6 @@ static vec3 centre(struct box b)
     return scale(add(b.min, b.max), 0.5f);
 }
 
-static struct box primitive_box(const struct scene *s, uint32_t prim)
-{
-    if (prim < s->num_triangles) {
-        const vec3 *p = s->position + 3 * (size_t)prim;
-        return box_add(box_add((struct box){p[0], p[0]}, p[1]), p[2]);
-    }
-    const struct sphere *sp = &s->spheres[prim - s->num_triangles];
-    vec3 r = v3(sp->radius, sp->radius, sp->radius);
-    return (struct box){sub(sp->centre, r), add(sp->centre, r)};
-}
-
 struct build {
     struct bvh *bvh;
     enum bvh_kind kind;
@@ -182,7 +171,7 @@ bool bvh_build_tree(struct bvh *t, enum bvh_kind kind)
         return false;
     }
     for (uint32_t i = 0; i < t->num_primitives; i++)
-        b.boxes[i] = primitive_box(t->scene, i);
+        scene_primitive_bounds(t->scene, i, &b.boxes[i].min, &b.boxes[i].max);
     t->num_nodes = 1;
     build_node(&b, 0, 0, t->num_primitives, 0);
     free(b.boxes);

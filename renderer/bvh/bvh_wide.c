@@ -54,16 +54,7 @@ static bool reserve(struct build *b, size_t size)
 static void set_item(const struct scene *s, uint32_t prim, struct wide_item *it)
 {
     vec3 low, high;
-    if (prim < s->num_triangles) {
-        const vec3 *p = s->position + 3 * (size_t)prim;
-        low = vmin(vmin(p[0], p[1]), p[2]);
-        high = vmax(vmax(p[0], p[1]), p[2]);
-    } else {
-        const struct sphere *sp = &s->spheres[prim - s->num_triangles];
-        vec3 r = v3(sp->radius, sp->radius, sp->radius);
-        low = sub(sp->centre, r);
-        high = add(sp->centre, r);
-    }
+    scene_primitive_bounds(s, prim, &low, &high);
     *it = (struct wide_item){
         .min = {low.x, low.y, low.z}, .prim = prim, .minus_max = {-high.x, -high.y, -high.z}};
 }

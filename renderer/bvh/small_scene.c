@@ -1,5 +1,7 @@
 #include "small_scene.h"
 
+#include "renderer/math/mat4.h"
+
 #include <string.h>
 
 static uint8_t find_corner(struct small_scene *f, vec3 p)
@@ -26,52 +28,33 @@ static uint8_t find_edge(struct small_scene *f, uint8_t from, uint8_t to)
     return (uint8_t)(2 * f->num_edges++);
 }
 
-struct point {
-    double v[3];
-};
-
-static struct point corner_of(const struct small_scene *f, int triangle, int k)
+static dvec3 corner_of(const struct small_scene *f, int triangle, int k)
 {
     const float *p = f->corner[f->triangle[triangle].corner[k]];
-    return (struct point){{p[0], p[1], p[2]}};
+    return d3((double)p[0], (double)p[1], (double)p[2]);
 }
 
-static struct point difference(struct point a, struct point b)
+static void set_row(float row[4], dvec3 a, double scale, dvec3 origin)
 {
-    return (struct point){{a.v[0] - b.v[0], a.v[1] - b.v[1], a.v[2] - b.v[2]}};
-}
-
-static double product(struct point a, struct point b)
-{
-    return a.v[0] * b.v[0] + a.v[1] * b.v[1] + a.v[2] * b.v[2];
-}
-
-static struct point cross_product(struct point a, struct point b)
-{
-    return (struct point){{a.v[1] * b.v[2] - a.v[2] * b.v[1], a.v[2] * b.v[0] - a.v[0] * b.v[2],
-                           a.v[0] * b.v[1] - a.v[1] * b.v[0]}};
-}
-
-static void set_row(float row[4], struct point a, double scale, struct point origin)
-{
-    for (int k = 0; k < 3; k++)
-        row[k] = (float)(a.v[k] * scale);
-    row[3] = (float)(-product(a, origin) * scale);
+    row[0] = (float)(a.x * scale);
+    row[1] = (float)(a.y * scale);
+    row[2] = (float)(a.z * scale);
+    row[3] = (float)(-d3_dot(a, origin) * scale);
 }
 
 /* With corner k of triangle i for the origin; false if rounding would be more than a few hundredths of
  * it. */
 static bool set_face(const struct small_scene *f, int i, int k, struct flat_face *face)
 {
-    struct point o = corner_of(f, i, k);
-    struct point eu = difference(corner_of(f, i, (k + 1) % 3), o);
-    struct point ev = difference(corner_of(f, i, (k + 2) % 3), o);
-    struct point n = cross_product(eu, ev);
-    double area2 = product(n, n), area = sqrt(area2);
+    dvec3 o = corner_of(f, i, k);
+    dvec3 eu = d3_sub(corner_of(f, i, (k + 1) % 3), o);
+    dvec3 ev = d3_sub(corner_of(f, i, (k + 2) % 3), o);
+    dvec3 n = d3_cross(eu, ev);
+    double area2 = d3_dot(n, n), area = sqrt(area2);
     if (!(FLAT_ERROR * (double)f->reach * (double)f->reach < 0.05 * area))
         return false;
-    set_row(face->u_row, cross_product(ev, n), 1 / area2, o);
-    set_row(face->v_row, cross_product(n, eu), 1 / area2, o);
+    set_row(face->u_row, d3_cross(ev, n), 1 / area2, o);
+    set_row(face->v_row, d3_cross(n, eu), 1 / area2, o);
     float plane[4];
     set_row(plane, n, 1 / area, o);
     memcpy(face->normal, plane, sizeof face->normal);
@@ -95,12 +78,11 @@ static bool completes(const struct small_scene *f, int i, int k, int j)
     }
     if (shared != 2 || other < 0)
         return false;
-    struct point o = corner_of(f, i, k), s = corner_of(f, i, (k + 1) % 3);
-    struct point t = corner_of(f, i, (k + 2) % 3), q = corner_of(f, j, other);
-    for (int c = 0; c < 3; c++)
-        if (fabs(q.v[c] - (s.v[c] + t.v[c] - o.v[c])) > 8 * FLT_EPSILON * (double)f->reach)
-            return false;
-    return true;
+    dvec3 o = corner_of(f, i, k), s = corner_of(f, i, (k + 1) % 3);
+    dvec3 t = corner_of(f, i, (k + 2) % 3), q = corner_of(f, j, other);
+    const dvec3 off = d3_sub(q, d3_sub(d3_add(s, t), o));
+    const double most = 8 * FLT_EPSILON * (double)f->reach;
+    return fabs(off.x) <= most && fabs(off.y) <= most && fabs(off.z) <= most;
 }
 
 static void fill_faces(struct small_scene *f)

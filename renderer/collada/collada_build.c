@@ -120,7 +120,7 @@ void build_add_triangle(struct loader *ld, const xmlNode *n, const mat4 *m, doub
     vec3 sum = v3(0, 0, 0);
     for (int k = 0; k < 3; k++) {
         vec3 f = in[k]->normal;
-        dvec3 w = d3_scale(mat4_cofactor(m, d3(f.x, f.y, f.z)), sign);
+        dvec3 w = d3_scale(mat4_cofactor(m, d3_of(f)), sign);
         normal[k] = d3_normalize(&w) ? build_to_float(w) : ng;
         sum = add(sum, normal[k]);
     }
@@ -193,16 +193,13 @@ bool build_find_bounds(const struct loader *ld, bool with_lamps, vec3 *lo, vec3 
     const struct scene *s = &ld->scene;
     *lo = v3(FLT_MAX, FLT_MAX, FLT_MAX);
     *hi = neg(*lo);
-    for (size_t k = 0; k < 3 * (size_t)s->num_triangles; k++) {
-        if (!with_lamps && ld->is_lamp[s->tri_object[k / 3]])
+    for (uint32_t i = 0; i < scene_num_primitives(s); i++) {
+        vec3 its_lo, its_hi;
+        if (!with_lamps && i < s->num_triangles && ld->is_lamp[s->tri_object[i]])
             continue;
-        *lo = vmin(*lo, s->position[k]);
-        *hi = vmax(*hi, s->position[k]);
-    }
-    for (uint32_t i = 0; i < s->num_spheres; i++) {
-        vec3 r = v3(s->spheres[i].radius, s->spheres[i].radius, s->spheres[i].radius);
-        *lo = vmin(*lo, sub(s->spheres[i].centre, r));
-        *hi = vmax(*hi, add(s->spheres[i].centre, r));
+        scene_primitive_bounds(s, i, &its_lo, &its_hi);
+        *lo = vmin(*lo, its_lo);
+        *hi = vmax(*hi, its_hi);
     }
     return lo->x <= hi->x;
 }

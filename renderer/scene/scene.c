@@ -1,6 +1,7 @@
 #include "scene.h"
 
 #include "environment.h"
+#include "renderer/math/mat4.h"
 
 #include <assert.h>
 #include <float.h>
@@ -235,14 +236,11 @@ static void find_bounds(struct scene *s)
     vec3 lo = v3(FLT_MAX, FLT_MAX, FLT_MAX), hi = neg(lo);
     if (scene_num_primitives(s) == 0)
         lo = hi = v3(0, 0, 0);
-    for (size_t k = 0; k < 3 * (size_t)s->num_triangles; k++) {
-        lo = vmin(lo, s->position[k]);
-        hi = vmax(hi, s->position[k]);
-    }
-    for (uint32_t i = 0; i < s->num_spheres; i++) {
-        float r = s->spheres[i].radius;
-        lo = vmin(lo, sub(s->spheres[i].centre, v3(r, r, r)));
-        hi = vmax(hi, add(s->spheres[i].centre, v3(r, r, r)));
+    for (uint32_t i = 0; i < scene_num_primitives(s); i++) {
+        vec3 its_lo, its_hi;
+        scene_primitive_bounds(s, i, &its_lo, &its_hi);
+        lo = vmin(lo, its_lo);
+        hi = vmax(hi, its_hi);
     }
     s->bounds_min = s->frame_min = lo;
     s->bounds_max = s->frame_max = hi;
@@ -250,10 +248,8 @@ static void find_bounds(struct scene *s)
 
 static double triangle_area(const vec3 *p)
 {
-    double ax = (double)p[1].x - p[0].x, ay = (double)p[1].y - p[0].y, az = (double)p[1].z - p[0].z;
-    double bx = (double)p[2].x - p[0].x, by = (double)p[2].y - p[0].y, bz = (double)p[2].z - p[0].z;
-    double x = ay * bz - az * by, y = az * bx - ax * bz, z = ax * by - ay * bx;
-    return 0.5 * sqrt(x * x + y * y + z * z);
+    const dvec3 o = d3_of(p[0]);
+    return 0.5 * d3_length(d3_cross(d3_sub(d3_of(p[1]), o), d3_sub(d3_of(p[2]), o)));
 }
 
 /* All lights of all emissive objects; the array has room for them. */

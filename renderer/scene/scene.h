@@ -216,4 +216,19 @@ static inline uint32_t scene_num_primitives(const struct scene *s)
     return s->num_triangles + s->num_spheres;
 }
 
+/* The box of a primitive. */
+static inline void scene_primitive_bounds(const struct scene *s, uint32_t prim, vec3 *lo, vec3 *hi)
+{
+    if (prim < s->num_triangles) {
+        const vec3 *p = s->position + 3 * (size_t)prim;
+        *lo = vmin(vmin(p[0], p[1]), p[2]);
+        *hi = vmax(vmax(p[0], p[1]), p[2]);
+        return;
+    }
+    const struct sphere *sp = &s->spheres[prim - s->num_triangles];
+    const vec3 r = v3(sp->radius, sp->radius, sp->radius);
+    *lo = sub(sp->centre, r);
+    *hi = add(sp->centre, r);
+}
+
 #endif

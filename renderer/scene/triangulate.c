@@ -36,7 +36,7 @@ static enum triangulate_result project(const dvec3 *p, uint32_t n, struct point 
         size2 = fmax(size2, d3_dot(a, a));
         if (i + 1 < n) {
             dvec3 c = d3_cross(a, d3_sub(p[i + 1], p[0]));
-            normal = d3(normal.x + c.x, normal.y + c.y, normal.z + c.z);
+            normal = d3_add(normal, c);
             largest = fmax(largest, d3_length(c));
         }
     }

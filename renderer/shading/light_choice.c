@@ -97,8 +97,7 @@ static void fill_cluster(const struct builder *w, const struct group *g, double 
         const vec3 r = v3(b->radius, b->radius, b->radius);
         least = vmin(least, sub(b->centre, r));
         most = vmax(most, add(b->centre, r));
-        axis = d3_sub(axis, d3_scale(d3((double)b->axis.x, (double)b->axis.y, (double)b->axis.z),
-                                     -b->value / all));
+        axis = d3_add(axis, d3_scale(d3_of(b->axis), b->value / all));
         reach = fmin(reach, (double)b->reach);
         value += b->value;
         even += b->value * (double)b->even;
@@ -110,8 +109,7 @@ static void fill_cluster(const struct builder *w, const struct group *g, double 
         axis = d3(0, 0, 1);
     for (uint32_t i = g->lo; i < g->hi; i++) {
         const struct light_bounds *b = &w->b[w->order[i]];
-        const double cosine =
-            axis.x * (double)b->axis.x + axis.y * (double)b->axis.y + axis.z * (double)b->axis.z;
+        const double cosine = d3_dot(axis, d3_of(b->axis));
         radius = fmax(radius, (double)(length(sub(b->centre, centre)) + b->radius));
         angle = fmax(angle, acos(fmax(-1, fmin(1, cosine))) + (double)b->angle);
     }

@@ -133,15 +133,6 @@ static struct hit our_hit(const struct bvh *bvh, const ray *r)
     return (struct hit){h.prim[0] != NO_HIT, h.t[0], h.prim[0]};
 }
 
-static dvec3 wide(vec3 a)
-{
-    return d3(a.x, a.y, a.z);
-}
-static dvec3 dmad(dvec3 a, double s, dvec3 b)
-{
-    return d3_sub(a, d3_scale(b, -s));
-}
-
 /* A triangle in double, seen along a ray: corners without their component along the ray. */
 struct view {
     dvec3 q[3];
@@ -151,13 +142,13 @@ struct view {
 static struct view view_along(const struct scene *s, uint32_t prim, const ray *r)
 {
     const vec3 *p = s->position + 3 * (size_t)prim;
-    dvec3 d = wide(r->d), v[3];
+    dvec3 d = d3_of(r->d), v[3];
     struct view w = {.cosine = 0};
     double longest = 0;
     for (int k = 0; k < 3; k++) {
-        v[k] = d3_sub(wide(p[k]), wide(r->o));
-        w.q[k] = dmad(v[k], -d3_dot(v[k], d) / d3_dot(d, d), d);
-        dvec3 e = d3_sub(wide(p[(k + 1) % 3]), wide(p[k]));
+        v[k] = d3_sub(d3_of(p[k]), d3_of(r->o));
+        w.q[k] = d3_sub(v[k], d3_scale(d, d3_dot(v[k], d) / d3_dot(d, d)));
+        dvec3 e = d3_sub(d3_of(p[(k + 1) % 3]), d3_of(p[k]));
         longest = fmax(longest, d3_length(e));
     }
     dvec3 n = d3_cross(d3_sub(v[1], v[0]), d3_sub(v[2], v[0]));
@@ -178,9 +169,9 @@ static double depth_inside(const struct view *w, const ray *r)
     for (int k = 0; k < 3; k++) {
         dvec3 a = w->q[k], e = d3_sub(w->q[(k + 1) % 3], a);
         double ee = d3_dot(e, e), along = ee > 0 ? -d3_dot(a, e) / ee : 0;
-        dvec3 at = dmad(a, along < 0 ? 0 : along > 1 ? 1 : along, e);
+        dvec3 at = d3_add(a, d3_scale(e, along < 0 ? 0 : along > 1 ? 1 : along));
         nearest = fmin(nearest, d3_length(at));
-        double side = d3_dot(d3_cross(a, e), wide(r->d));
+        double side = d3_dot(d3_cross(a, e), d3_of(r->d));
         left += side >= 0;
         right += side <= 0;
     }

@@ -76,7 +76,7 @@ TEST(rectangle_light)
  * disk of that solid angle's projection]. */
 TEST(sphere_light)
 {
-    static const float centre[3][3] = {{0, 1, 0}, {0.8f, 0.9f, -0.3f}, {0, 0.35f, -0.2f}};
+    static const float centre[3][3] = {{0, 1, 0}, {0.8f, 0.9f, -0.3f}, {0, 0.35f, 0.2f}};
     for (int q = 0; q < 3; q++) {
         OWN(scene) s = check_plate(v3(0, 1, 0), 0.5f);
         uint32_t lamp = build_material(&s, grey(0), grey(3));
