@@ -23,6 +23,11 @@ static void assert_close(vec3 a, float x, float y, float z)
         fail_msg("(%g %g %g) is not (%g %g %g)", a.x, a.y, a.z, x, y, z);
 }
 
+static void assert_rgb(rgb c, float r, float g, float b)
+{
+    assert_close(v3(c.r, c.g, c.b), r, g, b);
+}
+
 static const struct material *material_of(const struct scene *s, const char *object)
 {
     for (uint32_t i = 0; i < s->num_objects; i++)
@@ -55,10 +60,9 @@ TEST(spheres_lambertian)
         assert_close(s.normal[k], 0, -1, 0);
     }
     const struct material *lamp = material_of(&s, "Area"), *left = material_of(&s, "leftWall");
-    assert_close(v3(lamp->radiance.r, lamp->radiance.g, lamp->radiance.b), 10, 10, 10);
+    assert_rgb(lamp->radiance, 10, 10, 10);
     assert_false(lamp->radiance_both_sides);
-    assert_close(v3(left->reflectance.r, left->reflectance.g, left->reflectance.b), 0.6f, 0.2f,
-                 0.2f);
+    assert_rgb(left->reflectance, 0.6f, 0.2f, 0.2f);
     assert_close(s.camera.backward, 0, 0, 1);
     assert_true(fabs(s.camera.hfov - 49.13434 * DEGREE) < 1e-6);
     assert_true(fabs(s.camera.vfov - 37.849 * DEGREE) < 1e-4);
@@ -108,11 +112,6 @@ TEST(meshes_of_assignment_two)
     s = must_load("meshedit/maxplanck.dae", DIALECT_AUTO);
     assert_int_equal(s.num_triangles + s.num_degenerate, 50801);
     scene_free(&s);
-}
-
-static void assert_rgb(rgb c, float r, float g, float b)
-{
-    assert_close(v3(c.r, c.g, c.b), r, g, b);
 }
 
 /* One mirror of 1, one glass of 1.45, both clear; the box as in CBspheres_lambertian. */

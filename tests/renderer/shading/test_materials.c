@@ -11,13 +11,11 @@
 
 static const double DEGREE = M_PI / 180;
 
-/* A pinhole so narrow that the image is one direction: (0, sin, -cos) of the angle. */
+/* In the direction (0, sin, -cos) of the angle. */
 static void aim(struct scene *s, vec3 eye, double degrees)
 {
-    build_camera(s, eye, 0.02f);
     float sine = (float)sin(degrees * DEGREE), cosine = (float)cos(degrees * DEGREE);
-    s->camera.backward = v3(0, -sine, cosine);
-    s->camera.up = v3(0, cosine, sine);
+    check_aim(s, eye, v3(0, -sine, cosine), v3(0, cosine, sine));
 }
 
 static struct integrator_options options(int direct, int depth)
