@@ -1,3 +1,4 @@
+/* Vectors, colours and names as JSON, for the exporter to Cycles. */
 #include "export_cycles_internal.h"
 
 #include <string.h>

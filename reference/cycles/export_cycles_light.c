@@ -1,3 +1,4 @@
+/* Export to Cycles: point, spot and directional lights, and the environment. */
 #include "export_cycles_internal.h"
 
 #include "reference/replicates/replicate_images.h"

@@ -1,3 +1,5 @@
+/* Export to Cycles: materials, meshes and spheres. Microfacets that no BSDF of Cycles has
+ * become random facets (cycles_material.py). */
 #include "export_cycles_internal.h"
 #include "reference/suite/features.h"
 

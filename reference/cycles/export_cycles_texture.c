@@ -1,3 +1,4 @@
+/* Export to Cycles: textures, written as EXR files beside the scene. */
 #include "export_cycles_internal.h"
 
 #include "renderer/base/fs.h"

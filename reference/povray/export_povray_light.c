@@ -1,3 +1,4 @@
+/* Export to POV-Ray: light sources (point, spot, directional, area) and the sky. */
 #include "export_povray_internal.h"
 #include "povray_lamp.h"
 

@@ -1,3 +1,4 @@
+/* Stored references (goldens): reads, checks, writes and removes golden/SCENE/. */
 #define _GNU_SOURCE
 #include "reference_render.h"
 

@@ -1,3 +1,5 @@
+/* The hash of all that a reference depends on: program, scripts, scene, settings. It says
+ * whether stored work can be used. */
 #include "reference_internal.h"
 
 #include "reference/base/process.h"

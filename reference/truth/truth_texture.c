@@ -1,3 +1,4 @@
+/* Closed form of textured rectangles that face the camera (values: truth.h). */
 #include "truth.h"
 
 #include "truth_values.h"

@@ -1,3 +1,5 @@
+/* Builds the binary trees of bvh.h: split at the mean centroid (as the assignment does) or by
+ * the surface area heuristic, binned [Wald07]. */
 #include "bvh_internal.h"
 
 #include <float.h>

@@ -1,3 +1,4 @@
+/* PNG files by libpng: 8 bits are written, 8 and 16 bits read. */
 #include "image_library.h"
 #include "renderer/base/fs.h"
 

@@ -1,3 +1,4 @@
+/* Runs a program where namespaces are forbidden: a user of its own, seccomp, Landlock. */
 #define _GNU_SOURCE
 #include "confine.h"
 #include "run_user.h"

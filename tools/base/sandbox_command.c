@@ -1,3 +1,4 @@
+/* The command lines of the sandbox: bwrap, the supervisor, limits and environment of a run. */
 #define _GNU_SOURCE
 #include "sandbox_internal.h"
 

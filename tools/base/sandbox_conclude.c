@@ -1,3 +1,4 @@
+/* Why a run in the sandbox ended, from its status, times and the supervisor's report. */
 #include "sandbox_internal.h"
 
 #include <signal.h>

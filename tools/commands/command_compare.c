@@ -1,3 +1,4 @@
+/* assay compare: judges two renders. */
 #include "renderer/base/cli.h"
 #include "tools/validate/compare_job.h"
 #include "tools/compare/region.h"

@@ -1,3 +1,4 @@
+/* assay converge: how fast a renderer's error falls with samples. */
 #include "renderer/base/cli.h"
 #include "renderer/base/fs.h"
 #include "tools/converge/converge_run.h"

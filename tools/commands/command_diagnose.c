@@ -1,3 +1,4 @@
+/* assay diagnose: which known bug explains an image. */
 #include "reference/base/json_file.h"
 #include "renderer/base/cli.h"
 #include "renderer/base/fs.h"

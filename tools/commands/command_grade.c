@@ -1,3 +1,4 @@
+/* assay grade: grades submissions by a rubric. */
 #include "tools/gradebook/grade_options.h"
 #include "tools/results/results.h"
 #include "commands.h"

@@ -1,3 +1,4 @@
+/* assay init: starts a suite of the user's own. */
 #include "renderer/base/cli.h"
 #include "renderer/base/fs.h"
 #include "tools/base/data_dirs.h"

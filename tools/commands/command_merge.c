@@ -1,3 +1,4 @@
+/* assay merge: adds renders of successive sample ranges. */
 #include "renderer/base/cli.h"
 #include "renderer/base/shell_quote.h"
 #include "tools/jobs/merge.h"

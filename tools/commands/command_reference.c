@@ -1,3 +1,5 @@
+/* assay reference, the same as assay golden render: renders references by Cycles, POV-Ray or an engine
+ * file. */
 #include "reference/base/utc_date.h"
 #include "reference/base/json_node.h"
 #include "renderer/base/fs.h"

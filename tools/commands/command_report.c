@@ -1,3 +1,4 @@
+/* assay report: pages, tables and histories from results.json. */
 #include "renderer/base/cli.h"
 #include "renderer/base/fs.h"
 #include "tools/results/github_annotations.h"

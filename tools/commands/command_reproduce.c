@@ -1,3 +1,4 @@
+/* assay reproduce: makes a file again and compares bits. */
 #include "renderer/base/cli.h"
 #include "renderer/base/version.h"
 #include "tools/reproduce/reproduce.h"

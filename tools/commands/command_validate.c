@@ -1,3 +1,4 @@
+/* assay validate: judges renderers on the suite. */
 #include "tools/base/dir_lock.h"
 #include "tools/results/results.h"
 #include "tools/validate/validate_command.h"

@@ -1,3 +1,5 @@
+/* The answer key: each image of a rubric as it should be, rendered with each set of accepted
+ * deviations (grade_checks.h). */
 #include "grade_checks.h"
 
 #include "reference/base/process.h"

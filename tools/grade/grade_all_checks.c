@@ -1,3 +1,4 @@
+/* All checks of a submission, with the set of accepted deviations that leaves the most points. */
 #include "grade_checks.h"
 
 #include <stdio.h>

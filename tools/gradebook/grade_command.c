@@ -1,3 +1,4 @@
+/* What `assay grade` does with its options: sandbox, caches, one submission or a whole class. */
 #include "grade_options.h"
 
 #include "renderer/base/cli.h"

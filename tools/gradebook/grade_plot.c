@@ -1,3 +1,5 @@
+/* Plots of a check on the pages of grades: the difference by tiles, and intervals against
+ * margins. */
 #include "grade_images.h"
 #include "student_page.h"
 

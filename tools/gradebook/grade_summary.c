@@ -1,3 +1,5 @@
+/* What the pages of student and staff have in common: the named bug, points by part, the
+ * build's log. */
 #include "student_page.h"
 
 #include "reference/base/json_node.h"

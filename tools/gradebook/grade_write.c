@@ -1,3 +1,5 @@
+/* Writes the grades of a submission and of a class: JSON, CSV, JUnit, TAP, Gradescope's
+ * results.json, and the pages. */
 #include "grade_batch.h"
 #include "grade_needs.h"
 

@@ -1,3 +1,5 @@
+/* FLIP for HDR images: the exposures, the tone curve, and the largest error over all exposures
+ * [Andersson21]. */
 #include "flip.h"
 
 #include "luminance.h"

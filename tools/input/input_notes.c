@@ -1,3 +1,4 @@
+/* What had to be assumed about an input, a line each, for the verdict. */
 #include "input_internal.h"
 
 #include <stdarg.h>

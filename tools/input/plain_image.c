@@ -1,3 +1,5 @@
+/* Images without moments: their noise is estimated from neighbouring pixels, and rounding is
+ * taken into account. */
 #include "tools/images/tone_curve.h"
 #include "input_internal.h"
 #include "tools/images/image_file.h"

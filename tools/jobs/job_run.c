@@ -1,3 +1,4 @@
+/* Runs a job of a plan, and verifies its artefact by the receipt. */
 #define _GNU_SOURCE
 #include "reference/base/json_file.h"
 #include "reference/base/json_node.h"

@@ -1,3 +1,4 @@
+/* Builds a plan: its head, its inputs by hash, a line for each job. */
 #include "plan.h"
 
 #include "reference/base/json_node.h"

@@ -1,3 +1,4 @@
+/* libassay: options, comparison, result and maps (assay.h). */
 #include "assay.h"
 
 #include "library_internal.h"

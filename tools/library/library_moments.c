@@ -1,3 +1,4 @@
+/* libassay: moments that a caller gathers sample by sample or image by image (assay.h). */
 #include "library_internal.h"
 
 #include "renderer/image/moments.h"

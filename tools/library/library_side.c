@@ -1,3 +1,4 @@
+/* libassay: a side of a comparison, from a file or from memory. */
 #include "library_internal.h"
 
 #include <math.h>

@@ -1,3 +1,4 @@
+/* Plot of convergence: mean radiance against the greatest number of bounces. */
 #include "plot.h"
 #include "plot_convergence.h"
 

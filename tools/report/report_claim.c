@@ -1,3 +1,4 @@
+/* A claim on the page: heading, images, maps, plots and evidence. */
 #include "report_internal.h"
 
 #include "tools/html/csv_link.h"

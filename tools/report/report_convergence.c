@@ -1,3 +1,4 @@
+/* The page's section on convergence: slope, bias, variance, efficiency. */
 #include "report_internal.h"
 
 #include "tools/results/convergence_results.h"

@@ -1,3 +1,4 @@
+/* The page's table of costs: times of the engines, scene by scene. */
 #include "report_internal.h"
 
 #include "tools/results/render_cost.h"

@@ -1,3 +1,5 @@
+/* The evidence of a claim on the page: numbers, statistics, provenance, the command that runs
+ * it again. */
 #include "report_internal.h"
 
 #include "tools/compare/region.h"

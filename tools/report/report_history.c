@@ -1,3 +1,4 @@
+/* The page of a history: how quantities of each claim changed from run to run. */
 #include "tools/results/history.h"
 
 #include "renderer/base/fs.h"

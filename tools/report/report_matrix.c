@@ -1,3 +1,4 @@
+/* The page's matrix: a row for each scene, a column for each reference. */
 #include "report_internal.h"
 
 #include "reference/suite/engine_table.h"

@@ -1,3 +1,4 @@
+/* The page's section on noise: variance of a sample, and its fall. */
 #include "report_internal.h"
 
 #include "tools/html/html.h"

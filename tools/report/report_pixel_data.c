@@ -1,3 +1,5 @@
+/* The numbers behind the page's images, packed (pixel_codec.h) and written as base64; the
+ * browser computes the maps from them (tools/html/page_maps.js). */
 #include "tools/images/pixel_codec.h"
 #include "tools/html/plot_colour.h"
 #include "tools/html/html.h"

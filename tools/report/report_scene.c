@@ -1,3 +1,4 @@
+/* A scene on the page: its images, which its claims share, and its claims. */
 #include "report_internal.h"
 
 #include "renderer/base/fs.h"

@@ -1,3 +1,4 @@
+/* FLIP and idiff on the page, beside the statistics: they judge nothing. */
 #include "report_internal.h"
 
 #include "tools/images/luminance.h"

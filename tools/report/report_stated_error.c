@@ -1,3 +1,4 @@
+/* The page's section on stated errors ("consistency" in results.json). */
 #include "report_internal.h"
 
 #include "tools/results/stated_error_results.h"

@@ -1,3 +1,4 @@
+/* The page's table of verdicts, a row for each claim. */
 #include "report_internal.h"
 
 #include "tools/base/text.h"

@@ -1,3 +1,4 @@
+/* Makes a results.json again and compares all but times. */
 #include "reference/base/json_file.h"
 #include "reference/base/process.h"
 #include "renderer/base/cli_rewrite.h"

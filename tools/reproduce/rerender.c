@@ -1,3 +1,4 @@
+/* Makes an image again by the command that its attributes have. */
 #include "reference/base/process.h"
 #include "reference/store/reference_render.h"
 #include "renderer/base/cli.h"

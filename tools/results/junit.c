@@ -1,3 +1,4 @@
+/* Writes results as JUnit XML, a test case for each claim. */
 #include "noise_results.h"
 
 #include "reference/base/xml_errors.h"

@@ -1,3 +1,4 @@
+/* Checks a rubric as a whole: what its images, scenes and checks need of each other. */
 #include "rubric_internal.h"
 #include "renderer/base/fs.h"
 

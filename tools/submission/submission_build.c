@@ -1,3 +1,4 @@
+/* Unpacks and builds a submission, and runs its program, in the sandbox. */
 #include "kept_run.h"
 #include "submission.h"
 

@@ -1,3 +1,5 @@
+/* What became of a submission's runs, in words: not started, printed its usage, hung; which
+ * images are not worth a try. */
 #include "submission.h"
 
 #include <ctype.h>

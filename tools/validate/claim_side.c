@@ -1,3 +1,5 @@
+/* The two sides of a claim: renders ours, loads references and closed forms, runs live engines,
+ * and keeps the image of each look. */
 #include "validate_internal.h"
 
 #include "reference/base/json_file.h"

@@ -1,3 +1,5 @@
+/* Takes one look at a claim, decides it, and writes its row of results.json with the maps (z,
+ * relative). */
 #include "validate_internal.h"
 #include "renderer/base/fs.h"
 #include "tools/base/data_dirs.h"

@@ -1,3 +1,4 @@
+/* Claims about noise: the variance of a sample and its fall, against closed forms or records. */
 #include "validate_internal.h"
 
 #include "noise_ladder.h"

@@ -1,3 +1,5 @@
+/* Which claims a run has: every scene with every side, variants, consistency and noise, less
+ * what --only leaves out. */
 #include "noise_ladder.h"
 #include "validate_internal.h"
 

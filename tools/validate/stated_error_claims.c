@@ -1,3 +1,5 @@
+/* Claims about stated errors ("consistency"): does the error that renders state agree with the
+ * error between them. */
 #include "validate_internal.h"
 
 #include "reference/replicates/engine_driver.h"

@@ -1,3 +1,4 @@
+/* Progress of a validation on stderr, and the time that is left. */
 #include "validate_internal.h"
 
 #include "renderer/base/progress.h"

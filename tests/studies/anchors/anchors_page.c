@@ -1,3 +1,4 @@
+/* Writes the page of the anchors: the smallest error that each test finds, in tables. */
 #include "anchors.h"
 
 #include "tests/support/rates.h"

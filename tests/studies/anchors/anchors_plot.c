@@ -1,3 +1,4 @@
+/* The plot of the anchors: the smallest error that each rule finds, for each scene. */
 #include "anchors.h"
 
 #include "renderer/base/fs.h"

@@ -1,3 +1,4 @@
+/* Plots of the calibration: error rates and power against samples, with error bars. */
 #include "calibrate.h"
 
 #include "tests/support/rates.h"

@@ -1,3 +1,4 @@
+/* Writes the page of the calibration: measured error rates with their confidence intervals. */
 #include "calibrate.h"
 
 #include "tests/support/rates.h"
