@@ -244,10 +244,10 @@ TEST(memory_is_bounded_for_one_process_and_for_all)
     assert_int_not_equal(r.end, SANDBOX_OK);
     /* Four with 100 MB each, under 256 MiB for each of them. */
     r = run(
-        "for i in 1 2 3 4; do (head -c 100M /dev/zero; sleep 20) | tail -n 1 >/dev/null & done; wait");
+        "for i in 1 2 3 4; do (head -c 150M /dev/zero; sleep 20) | tail -n 1 >/dev/null & done; wait");
     assert_int_equal(r.end, SANDBOX_MEMORY);
     assert_true(r.wall_s < 20);
-    r = run("(head -c 100M /dev/zero; sleep 1) | tail -n 1 >/dev/null");
+    r = run("(head -c 150M /dev/zero; sleep 1) | tail -n 1 >/dev/null");
     assert_int_equal(r.end, SANDBOX_OK);
     /* Pages that belong to no process are not to be had: */
     static const char uncounted[] =
@@ -540,7 +540,8 @@ TEST(nothing_of_a_run_without_namespaces_is_left)
     leave(&s);
 }
 
-/* Eight with 100 MB each, which no process may not have, and no namespaces in which somebody counts them: the kernel does. Control: two. */
+/* Four hold 150 MB each at the same time. No process has more than it may, and there are no namespaces in which somebody adds
+ * them up: the kernel does. Control: two. */
 TEST(memory_of_all_is_bounded_without_namespaces)
 {
     only_root();
@@ -552,10 +553,12 @@ TEST(memory_of_all_is_bounded_without_namespaces)
     struct sandbox s;
     enter_bare(&s);
     static const char fill[] =
-        "set --; for i in %s; do (head -c 100M /dev/zero; sleep 2) | tail -n 1 >/dev/null & set -- $@ $!; done;"
+        "set --; for i in %s; do (head -c 150M /dev/zero; touch full.$i; until [ -e go ]; do sleep .1; done) | "
+        "tail -n 1 >/dev/null & set -- $@ $!; done; for i in %s; do until [ -e full.$i ]; do sleep .1; done; done; touch go;"
         "for p; do wait $p || exit 1; done";
-    assert_int_equal(run(fs_path(fill, "1 2 3 4 5 6 7 8").s).end, SANDBOX_MEMORY);
-    assert_int_equal(run(fs_path(fill, "1 2").s).end, SANDBOX_OK);
+    static const char *const four = "1 2 3 4", *const two = "1 2";
+    assert_int_equal(run(fs_path(fill, four, four).s).end, SANDBOX_MEMORY);
+    assert_int_equal(run(fs_path(fill, two, two).s).end, SANDBOX_OK);
     leave(&s);
 }
 
