@@ -1,6 +1,6 @@
 #include "carried_ratio.h"
 
-#include "rate_image.h"
+#include "tools/submission/rate_image.h"
 
 #include <gsl/gsl_statistics_double.h>
 #include <math.h>

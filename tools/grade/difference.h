@@ -3,7 +3,7 @@
 #define ASSAY_DIFFERENCE_H
 
 #include "tools/compare/pyramid.h"
-#include "submitted_image.h"
+#include "tools/submission/submitted_image.h"
 
 /* A quantity that should be 0 and the interval that holds its true value with 1 - alpha. */
 struct interval {

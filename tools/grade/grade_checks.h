@@ -3,7 +3,7 @@
 #ifndef ASSAY_GRADE_CHECKS_H
 #define ASSAY_GRADE_CHECKS_H
 
-#include "difference.h"
+#include "score.h"
 #include "tools/submission/submission.h"
 
 /* What the images of a rubric should be; made once for all submissions. */
@@ -45,24 +45,6 @@ const struct moments *answer_key_counts(const struct answer_key *a, int set, int
 NODISCARD bool answer_key_render(const struct rubric *r, int image, bool as_asked,
                                  const char *words, int spp, const struct answer_options *opt,
                                  struct moments *out, struct err *e);
-
-/* Points as a share of what the check is worth: 1 where the interval comes within margin.full of 0, 0 where it stays
- * margin.none away, linear between. */
-double score_share(const struct margin *m, const struct interval *i);
-
-/* A noisy image has a wide interval, which comes near 0 whatever is wrong. While half its width is
- * more than margin.none, the share says nothing. Returns the factor by which the samples have to
- * grow to change that; 0 if the share is decided. blur: the part of half the width that more
- * samples do not reduce. */
-double score_more(const struct margin *m, const struct interval *i, double blur);
-
-/* Where no more samples can be had, width costs points: 1 up to margin.none, 0 from twice that. */
-double score_width(const struct margin *m, const struct interval *i);
-
-/* The probability that a fresh run of the same program gets another share, if the estimate is the truth;
- * 1 where the share lies between 0 and 1. For a program that is within margin.full the interval itself
- * ensures, whatever the noise, that less than all points have a probability of at most alpha. */
-double score_chance(const struct margin *m, const struct interval *i);
 
 struct result {
     double share;  /* 0 .. 1 of the points */

@@ -1,11 +1,11 @@
 #include "rubric_bugs.h"
 
-#include "rate_image.h"
 #include "stopping_rule.h"
 
 #include "renderer/base/fs.h"
 #include "renderer/base/sha256.h"
 #include "tools/diagnose/bug_fit.h"
+#include "tools/submission/rate_image.h"
 
 #include <math.h>
 #include <stdio.h>

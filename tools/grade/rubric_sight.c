@@ -1,7 +1,7 @@
 #include "rubric_sight.h"
 
-#include "rate_image.h"
 #include "tools/images/tone_curve.h"
+#include "tools/submission/rate_image.h"
 
 #include <gsl/gsl_cdf.h>
 #include <gsl/gsl_randist.h>

@@ -2,7 +2,7 @@
 #ifndef ASSAY_TESTS_SUBMIT_CODES_H
 #define ASSAY_TESTS_SUBMIT_CODES_H
 
-#include "tools/grade/submitted_image.h"
+#include "tools/submission/submitted_image.h"
 
 /* 3 codes a pixel, by the assignment's curve. Freed with submitted_image_free(). */
 struct submitted_image submit_codes(const uint8_t *rgb8, int width, int height);

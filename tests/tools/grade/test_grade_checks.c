@@ -6,7 +6,7 @@
 
 #include "renderer/image/tone.h"
 #include "tools/grade/grade_checks.h"
-#include "tools/grade/rate_image.h"
+#include "tools/submission/rate_image.h"
 #include "tools/grade/stopping_rule.h"
 #include "submit_codes.h"
 #include "tests/support/own.h"

@@ -1,10 +1,10 @@
 #include "submitted_image.h"
 
+#include "rubric.h"
 #include "renderer/base/sha256.h"
+#include "tools/images/image_file.h"
 #include "tools/images/luminance.h"
 #include "tools/images/tone_curve.h"
-#include "tools/images/image_file.h"
-#include "tools/submission/rubric.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -3,7 +3,7 @@
 #define ASSAY_RATE_IMAGE_H
 
 #include "renderer/image/moments.h"
-#include "tools/submission/rubric.h"
+#include "rubric.h"
 
 struct rate_image {
     double pixels,
