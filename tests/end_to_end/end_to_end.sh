@@ -768,18 +768,23 @@ if "$assay" grade -q -o "$tmp/probe" "$tmp/quick.rubric" "$tmp/subs/right" >"$tm
     cp "$tmp/grades/grades.csv" "$tmp/first.csv" && rm -r "$tmp/grades/right" "$tmp/grades/text"
     expect "grade: goes on where it was" 2 "right  *8.00 of 8" "$assay" grade -o "$tmp/grades" "$tmp/quick.rubric" "$tmp/subs"/*
     cmp -s "$tmp/first.csv" "$tmp/grades/grades.csv" && ok "grade: the same points again" || not_ok "grade: the same points again" "they differ"
-    mkdir "$tmp/two" && cp -r "$plain/mutants/point_light_linear" "$tmp/two/student" && cp "$pathtracer" "$tmp/two/right"
-    sed 's/^limit wall 10/limit wall 60\ndiagnose {program} -q -t {threads} -r {width} {height} -s {spp} -m {bounces} --seed {seed} {options} -f {out} {scene}/
-        $a check secret 2 equal point\n image 0.01 0.05\n tile 0.03 0.12\n title Behind the curtain\n visibility hidden' "$tmp/quick.rubric" |
-        sed 's/^total 8/total 10/' >"$tmp/named.rubric"
+    mkdir "$tmp/two" && cp -r "$plain/mutants/light_pdf_unnormalised" "$tmp/two/student" && cp "$pathtracer" "$tmp/two/right"
+    cp -r tools/rubrics/cs184-bugs tools/rubrics/corner.dae "$tmp"
+    { # one image of those whose bugs are known
+        printf '%s\n' "rubric Named" "bugs cs184-bugs" "total 10" \
+            "command {program} -q -s {spp} -l {lights} -m {bounces} -r {width} {height} --seed {seed} {options} -f {out} {scene}"
+        sed -n '/^image corner$/,/^ *reference/p' tools/rubrics/cs184-3-1.rubric
+        printf '%s\n' "part 4 Indirect light" "check corner 8 equal corner" "image 0.02 0.08" "tile 0.06 0.2" \
+            "check secret 2 equal corner" "image 0.02 0.08" "tile 0.06 0.2" "title Behind the curtain" "visibility hidden"
+    } >"$tmp/named.rubric"
     expect "grade: with diagnosis" 0 "student  *0.00 of 10" "$assay" grade -j 2 -o "$tmp/named" "$tmp/named.rubric" "$tmp/two"/*
-    expect "grade: the bug is named" 0 '"name": "point_light_linear"' cat "$tmp/named/student/grade.json"
+    expect "grade: the bug is named" 0 '"name": "light_pdf_unnormalised"' cat "$tmp/named/student/grade.json"
     expect "grade: to the student" 0 "This looks like: " cat "$tmp/named/student/results.json"
     expect "grade: on the page" 0 "This looks like a known mistake" cat "$tmp/named/student/index.html"
     expect "grade: the plot of it" 0 "all points while a bar touches green" cat "$tmp/named/student/index.html"
     expect "grade: and whether another run would change it" 0 "gets the same points here" cat "$tmp/named/student/index.html"
     expect "grade: a right program is not diagnosed" 0 '"diagnosis": null' cat "$tmp/named/right/grade.json"
-    expect "grade: staff see who has it" 0 'student/index.html.*a point light falls with the distance' bash -c "tr -d '\n' <'$tmp/named/index.html'"
+    expect "grade: staff see who has it" 0 'student/index.html.*density lacks 1/distance' bash -c "tr -d '\n' <'$tmp/named/index.html'"
     if ! grep -q "<html" "$tmp/named/student/index.html" ||
         grep -q "Behind the curtain\|http://\|https://\|<script" "$tmp/named/student/index.html"; then
         not_ok "grade: the page has no hidden check and needs no other file" "it does"

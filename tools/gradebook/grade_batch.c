@@ -155,23 +155,6 @@ static bool add_checks(const struct collect *c, struct submitted_images *h, json
     return ok;
 }
 
-/* By the images that are there; where they do not tell one bug, by those of `assay diagnose`, if it can make them. */
-static json_t *name_bug(const struct grade_job *job, const struct submission *s,
-                        const struct mistake *mistake, const char *work)
-{
-    json_t *by_images = grade_diagnose_by_images(job->bugs, job->rubric, mistake);
-    if (job->diagnosis == NULL || s->kind == SUBMISSION_IMAGES || s->why[0] != '\0' ||
-        json_array_size(json_object_get(by_images, "named")) == 1)
-        return by_images;
-    json_t *by_views = grade_diagnose_of(job->diagnosis, job->sandbox, s, work, job->s->seed,
-                                         job->s->threads, job->s->alpha);
-    size_t views = json_array_size(json_object_get(by_views, "named")),
-           images = json_array_size(json_object_get(by_images, "named"));
-    bool better = json_is_null(by_images) || (views > 0 && (images == 0 || views < images));
-    json_decref(better ? by_images : by_views);
-    return better ? by_views : by_images;
-}
-
 static bool grade_made(const struct grade_job *job, struct submission *s, const char *work,
                        const char *out, json_t *grade, struct err *e)
 {
@@ -184,7 +167,9 @@ static bool grade_made(const struct grade_job *job, struct submission *s, const 
     json_object_set_new(grade, "wrong", s->why[0] != '\0' ? json_string(s->why) : json_null());
     ok = ok && add_checks(&c, h, grade, &mistake, e);
     json_object_set_new(grade, "diagnosis",
-                        ok && mistake.judged ? name_bug(job, s, &mistake, work) : json_null());
+                        ok && mistake.judged
+                            ? grade_diagnose_by_images(job->bugs, job->rubric, &mistake)
+                            : json_null());
     if (ok && mistake.located.text[0] != '\0') {
         json_object_set_new(grade, "located", json_string(mistake.located.text));
         json_object_set_new(grade, "located_picture",

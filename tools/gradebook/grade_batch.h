@@ -18,9 +18,8 @@ struct grade_job {
     const char *const *word; /* grade_options_words(), for "command" of a grade; NULL: not said */
     const struct grade_settings
         *s; /* submissions, how many at a time, where OUT/ID/grade.json goes, .. */
-    const struct rubric_bugs *bugs;          /* NULL: bugs are not named by the images */
-    const struct grade_diagnosis *diagnosis; /* NULL: nor by more of them */
-    const struct appeals *appeals;           /* NULL: none */
+    const struct rubric_bugs *bugs; /* NULL: bugs are not named */
+    const struct appeals *appeals;  /* NULL: none */
     /* One at a time. */
     void (*done)(const struct grade_settings *s, int num, const json_t *grade);
 };

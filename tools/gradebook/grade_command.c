@@ -127,12 +127,11 @@ static void warn_of_strangers(const char *file, const struct appeals *a, const j
 }
 
 static int run_batch(const struct grade_settings *s, const struct rubric *r,
-                     const struct suite *suite, const struct answer_key *answers,
-                     const char *const *word, const struct sandbox *box, struct err *e)
+                     const struct answer_key *answers, const char *const *word,
+                     const struct sandbox *box, struct err *e)
 {
     char stage[sizeof box->dir.path + 16];
     const struct path cache = fs_path("%s/cache", box->dir.path);
-    struct grade_diagnosis diagnosis = {0};
     struct rubric_bugs *bugs = calloc(1, sizeof *bugs);
     struct appeals appeals = {0};
     struct grade_job job = {.rubric = r,
@@ -147,7 +146,6 @@ static int run_batch(const struct grade_settings *s, const struct rubric *r,
     json_t *grades = NULL;
     int code = EXIT_NOT_JUDGED;
     snprintf(stage, sizeof stage, "%s/stage", box->dir.path);
-    const struct path views = fs_path("%s/views", box->dir.path);
     bool ok = (bugs != NULL || err_set(e, "out of memory")) &&
               (s->appeals == NULL || appeals_read(s->appeals, r, &appeals, e)) &&
               submission_stage(r, stage, e) &&
@@ -155,10 +153,6 @@ static int run_batch(const struct grade_settings *s, const struct rubric *r,
     if (ok && r->bugs[0] != '\0') {
         ok = rubric_bugs_open(r, answers, bugs, e);
         job.bugs = bugs;
-    }
-    if (ok && r->diagnose[0] != '\0') {
-        ok = grade_diagnose_open(r, s->catalogue, suite, views.s, &diagnosis, e);
-        job.diagnosis = &diagnosis;
     }
     ok = ok && grade_batch_run(&job, &grades, e) && same_noise(s->out, r, answers, grades, e);
     if (ok)
@@ -176,7 +170,6 @@ static int run_batch(const struct grade_settings *s, const struct rubric *r,
     }
     json_decref(grades);
     appeals_free(&appeals);
-    grade_diagnose_close(&diagnosis);
     if (bugs != NULL)
         rubric_bugs_close(bugs);
     free(bugs);
@@ -188,7 +181,7 @@ static bool open_box(const struct grade_settings *s, const struct rubric *r, con
                      const char *pathtracer, struct sandbox *box, struct err *e)
 {
     const struct data_dirs at = data_dirs_find();
-    const char *const ours[] = {at.share.s, s->golden, s->suite,  s->catalogue, r->dir,
+    const char *const ours[] = {at.share.s, s->golden, s->suite,  r->dir,
                                 cache,      s->out,    s->before, pathtracer};
     enum { NUM = sizeof ours / sizeof *ours };
     const char **hidden = calloc((size_t)(NUM + s->num) + 1, sizeof *hidden);
@@ -202,8 +195,8 @@ static bool open_box(const struct grade_settings *s, const struct rubric *r, con
     return ok;
 }
 
-static int grade(const struct grade_settings *s, const struct rubric *r, const struct suite *suite,
-                 int argc, char **argv, struct err *e)
+static int grade(const struct grade_settings *s, const struct rubric *r, int argc, char **argv,
+                 struct err *e)
 {
     char pathtracer[PATH_MAX];
     const struct path cache = grade_options_references(s);
@@ -236,7 +229,7 @@ static int grade(const struct grade_settings *s, const struct rubric *r, const s
         if (ok && s->fill)
             code = fill_cache(s, r, &box, e) ? 0 : EXIT_NOT_JUDGED;
         else if (ok && fs_make_dirs(cache.s, e) && answer_key_make(r, &opt, answers, e))
-            code = run_batch(s, r, suite, answers, (const char *const *)word, &box, e);
+            code = run_batch(s, r, answers, (const char *const *)word, &box, e);
         free(word);
         sandbox_close(&box);
     } else if (!s->unsafe) {
@@ -281,7 +274,7 @@ int grade_command(const struct grade_settings *s, int argc, char **argv, struct 
                   rubric_variant_read(grade_options_references(s).s, &suite, s->variant, r, &m,
                                       e) &&
                   print_mistakes(r, &m, e)))
-            code = grade(s, r, &suite, argc, argv, e);
+            code = grade(s, r, argc, argv, e);
         dir_lock_release(&lock);
     }
     suite_free(&suite);

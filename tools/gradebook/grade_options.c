@@ -54,7 +54,6 @@ static const struct cli_option options[] = {
      TO(pathtracer)},
     {0, "golden", "DIR", "stored references (golden)", TO(golden)},
     {0, "suite", "DIR", "scenes (reference/scenes)", TO(suite)},
-    {0, "catalogue", "DIR", "the stored effects of bugs (golden/diagnose)", TO(catalogue)},
     {0, "references", "DIR",
      "where the references are kept (.references in OUT, or in that of --before)", TO(references)},
     {0, "slurm", "", "a job for each submission on a Slurm cluster", TO(slurm)},
@@ -135,6 +134,5 @@ struct grade_settings grade_options_default(int argc, struct data_dirs *at)
                                    .alpha = 1e-5,
                                    .suite = at->suite.s,
                                    .golden = at->golden.s,
-                                   .catalogue = at->catalogue.s,
                                    .submission = calloc((size_t)argc + 1, sizeof(const char *))};
 }

@@ -7,8 +7,8 @@
 #include <stdint.h>
 
 struct grade_settings {
-    const char *rubric, *out, *pathtracer, *golden, *suite, *catalogue, *references, *build_cache,
-        *before, *appeals;   /* before: out, if nothing else is said; NULL: none */
+    const char *rubric, *out, *pathtracer, *golden, *suite, *references, *build_cache, *before,
+        *appeals;            /* before: out, if nothing else is said; NULL: none */
     const char **submission; /* num of them, words of the command */
     int num, jobs, threads, variant;
     uint64_t seed;

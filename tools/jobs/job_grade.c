@@ -50,8 +50,7 @@ static bool rubric_inputs(struct plan *p, const struct grade_settings *s, const 
                                          plan_input(p, image->suite->environment, e));
     }
     ok = ok && (s->build_cache == NULL || plan_input(p, s->build_cache, e)) &&
-         beside_rubric(p, r, r->bugs, e) && plan_input(p, s->rubric, e) &&
-         (r->diagnose[0] == '\0' || plan_input(p, s->catalogue, e));
+         beside_rubric(p, r, r->bugs, e) && plan_input(p, s->rubric, e);
     suite_free(&suite);
     free(r);
     return ok;

@@ -357,7 +357,6 @@ static const struct member of_rubric[] = {{"rubric", TEXT, TO(rubric, title)},
                                           {"variants", .read = read_variants},
                                           {"curve", TEXT, TO(rubric, curve)},
                                           {"command", TEXT, TO(rubric, command)},
-                                          {"diagnose", TEXT, TO(rubric, diagnose)},
                                           {"bugs", .read = read_bugs},
                                           {"output", TEXT, TO(rubric, output)},
                                           {"program", TEXT, TO(rubric, program)},
@@ -428,10 +427,11 @@ static void read_statement(struct statement *s)
         read_image(s); /* a check's margin of that name is two numbers, which are no name */
     else if (!read_member(s, of_rubric, s->r, word) && !read_member(s, of_image, s->image, word) &&
              !read_member(s, of_check, s->check, word)) {
-        rubric_mistake(s->m, s->line, "'%s' is no statement %s", word,
+        rubric_mistake(s->m, s->line, "'%s' is no statement %s%s", word,
                        s->image != NULL   ? "of an image"
                        : s->check != NULL ? "of a check"
-                                          : "here");
+                                          : "here",
+                       strcmp(word, "diagnose") == 0 ? ": 'bugs DIR' names bugs" : "");
         return;
     }
     if (s->rest[0] != '\0')

@@ -90,7 +90,7 @@ struct rubric_part {
 
 struct rubric {
     char path[4096], dir[4096]; /* of the file; of what lies beside it */
-    char title[160], curve[32], command[1024], diagnose[1024], output[64], program[128], bugs[128];
+    char title[160], curve[32], command[1024], output[64], program[128], bugs[128];
     char build[2048];    /* lines for sh(1) */
     char packages[1024]; /* of Debian, for `build` */
     struct sandbox_limits limit;

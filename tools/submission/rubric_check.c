@@ -80,7 +80,7 @@ static void set_default(char *text, size_t size, const char *value)
         snprintf(text, size, "%s", value);
 }
 
-static void check_command(const char *what, const char *command, struct rubric_mistakes *m)
+static void check_command(const char *command, struct rubric_mistakes *m)
 {
     static const char *const known[] = {"program", "scene",   "out",     "width",   "height", "spp",
                                         "lights",  "bounces", "threads", "options", "seed",   NULL};
@@ -89,10 +89,10 @@ static void check_command(const char *what, const char *command, struct rubric_m
         size_t n = strcspn(c + 1, "} ");
         snprintf(name, sizeof name, "%.*s", (int)(n < 31 ? n : 31), c + 1);
         if (!is_word(name, known))
-            rubric_mistake(m, LINE_WHOLE, "%s: {%s} is nothing that is replaced", what, name);
+            rubric_mistake(m, LINE_WHOLE, "command: {%s} is nothing that is replaced", name);
     }
     if (strstr(command, "{out}") == NULL)
-        rubric_mistake(m, LINE_WHOLE, "%s: without {out} there is no image", what);
+        rubric_mistake(m, LINE_WHOLE, "command: without {out} there is no image");
 }
 
 static bool is_beside(const struct rubric *r, const char *file)
@@ -126,9 +126,7 @@ static void check_head(struct rubric *r, struct rubric_mistakes *m)
     set_default(r->command, sizeof r->command,
                 "{program} -t {threads} -r {width} {height} -s {spp} -l {lights} -m {bounces} "
                 "{options} -f {out} {scene}");
-    check_command("command", r->command, m);
-    if (r->diagnose[0] != '\0')
-        check_command("diagnose", r->diagnose, m);
+    check_command(r->command, m);
     if (r->bugs[0] != '\0' && !is_beside(r, r->bugs))
         rubric_mistake(m, LINE_WHOLE, "bugs: no directory '%s' beside the rubric", r->bugs);
 }

@@ -180,6 +180,8 @@ TEST(each_mistake_is_named_with_its_line)
         {1, 1, "rubric a\nbugs nowhere", "no directory 'nowhere'"},
         {1, 2, "rubric a\nbugs a/b", "no name"},
         {1, 3, "rubric a\nbugs a\nbugs b", "a second 'bugs'"},
+        {1, 2, "rubric a\ndiagnose ./x {scene} {out}",
+         "'diagnose' is no statement here: 'bugs DIR'"},
         {1, 2, "rubric a\nlimit patience 5", "limit patience"},
         {1, 2, "rubric a\nbudget wall 5", "of cpu"},
         {1, 2, "rubric a\nlimit wall long", "limit wall"},
