@@ -32,8 +32,8 @@ struct grade_job {
  * the order of path. */
 NODISCARD bool grade_batch_run(const struct grade_job *job, json_t **grades, struct err *e);
 
-/* What is made of the grades, without the submissions: of the class, OUT/grades.json, the array, grades.csv, junit.xml, grades.tap
- * and index.html, the page for staff; of each submission, OUT/ID/results.json as Gradescope reads it, index.html, and staff.html with
+/* What is made of the grades, without the submissions: of the class, OUT/grades.json, the array, grades.csv, junit.xml and
+ * index.html, the page for staff; of each submission, OUT/ID/results.json as Gradescope reads it, index.html, and staff.html with
  * the references (r, a: NULL, none). The pages need no other file to be read. */
 NODISCARD bool grade_write(const char *out, const struct rubric *r, const struct answer_key *a,
                            const json_t *grades, struct err *e);

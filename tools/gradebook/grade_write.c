@@ -165,41 +165,6 @@ static void write_csv(FILE *f, const json_t *grades)
     }
 }
 
-/* One point a line: `#` would begin a directive. */
-static void tap_text(FILE *f, const char *text)
-{
-    for (; *text != '\0'; text++)
-        fputc(*text == '#' || *text == '\n' ? ' ' : *text, f);
-}
-
-static void write_tap(FILE *f, const json_t *grades)
-{
-    size_t num = 0;
-    json_each(g, grades) {
-        size_t checks = json_array_size(json_object_get(g, "checks"));
-        num += checks > 0 ? checks : 1;
-    }
-    fprintf(f, "TAP version 13\n1..%zu\n", num);
-    num = 0;
-    json_each(g, grades) {
-        if (json_array_size(json_object_get(g, "checks")) == 0) {
-            fprintf(f, "not ok %zu - ", ++num);
-            tap_text(f, member_or_empty(g, "id"));
-            fputs(": ", f);
-            tap_text(f, member_or_empty(g, "trouble"));
-            fputc('\n', f);
-        }
-        json_each(c, json_object_get(g, "checks")) {
-            fprintf(f, "%s %zu - ", is_full(c) ? "ok" : "not ok", ++num);
-            tap_text(f, member_or_empty(g, "id"));
-            fprintf(f, " %s (%.2f of %g): ", member_or_empty(c, "name"), member_number(c, "points"),
-                    member_number(c, "of"));
-            tap_text(f, member_or_empty(c, "seen"));
-            fputc('\n', f);
-        }
-    }
-}
-
 static void xml_pair(FILE *f, const char *name, const char *value)
 {
     fprintf(f, " %s=\"", name);
@@ -270,8 +235,6 @@ static bool write_text(const json_t *grades, const char *name, FILE *f, struct e
         write_csv(f, grades);
     else if (strcmp(name, "junit.xml") == 0)
         write_junit(f, grades);
-    else if (strcmp(name, "grades.tap") == 0)
-        write_tap(f, grades);
     else {
         assert(strcmp(name, "index.html") == 0);
         return class_page(f, grades, e);
@@ -279,8 +242,7 @@ static bool write_text(const json_t *grades, const char *name, FILE *f, struct e
     return true;
 }
 
-static const char *const class_files[] = {"grades.csv", "junit.xml", "grades.tap", "index.html",
-                                          NULL};
+static const char *const class_files[] = {"grades.csv", "junit.xml", "index.html", NULL};
 static const char *const pages[] = {"index.html", "staff.html", NULL};
 
 /* One of these. grades: the array, of a class; one grade, of a submission. */
