@@ -117,9 +117,12 @@ static void read_limit(struct statement *s)
         take_number(s, "limit build", 1, 1e5, &s->r->build_s);
     else if (strcmp(what, "processes") == 0)
         take_int(s, "limit processes", 1, 4096, &l->processes);
-    else if (strcmp(what, "memory") == 0 || strcmp(what, "build-memory") == 0) {
+    else if (strcmp(what, "memory") == 0) {
         if (take_number(s, "limit memory", 16, 1 << 20, &v))
-            *(what[0] == 'm' ? &l->memory : &s->r->build_memory) = (size_t)(v * (1 << 20));
+            l->memory = (size_t)(v * (1 << 20));
+    } else if (strcmp(what, "build-memory") == 0) {
+        if (take_number(s, "limit build-memory", 16, 1 << 20, &v))
+            s->r->build_memory = (size_t)(v * (1 << 20));
     } else if (strcmp(what, "disk") == 0) {
         if (take_number(s, "limit disk", 1, 1 << 20, &v)) {
             l->disk = (size_t)(v * (1 << 20));

@@ -185,7 +185,7 @@ TEST(each_mistake_is_named_with_its_line)
         {1, 2, "rubric a\nlimit patience 5", "limit patience"},
         {1, 2, "rubric a\nbudget wall 5", "of cpu"},
         {1, 2, "rubric a\nlimit wall long", "limit wall"},
-        {1, 2, "rubric a\nlimit build-memory 1", "limit memory"},
+        {1, 2, "rubric a\nlimit build-memory 1", "limit build-memory"},
         {1, 2, "rubric a\nbuild", "needs a text"},
         {1, 2, "rubric a\nrubric b", "second"},
         {1, 2, "rubric a\nvariants 1", "variants"},
