@@ -1,20 +1,18 @@
 # Assay. `make validate` and `make check` are the two commands; `make help` lists the rest.
 # Everything is built below $(BUILD); only `make golden` and the studies write beside the sources.
-# This file builds the programs; tests/tests.mk has what tests, measures and looks at them.
+# This file builds the programs and runs the suite; tools/packaging/packaging.mk installs and packs them, tests/tests.mk and the
+# files that it includes test, measure and look at them. Lines that begin with "#: " are `make help`.
 
 BUILD  ?= build
-PREFIX ?= /usr/local
 LIVE   ?=
 ONLY   ?=
 ALPHA  ?= 1e-3
-RUBRIC ?= tools/rubrics/cs184-3-1.rubric
 V      ?=
 MAKEFLAGS += --jobs=$(shell nproc)
 
 # Debian packages: to build and validate, to render the references.
 DEPS      := gcc g++ make pkg-config libxml2-dev libopenexr-dev libpng-dev libopenimageio-dev libjansson-dev libgsl-dev \
   nettle-dev zlib1g-dev libdeflate-dev bubblewrap unzip
-DEPS_DEB  := dpkg-dev
 DEPS_LIVE := blender povray python3-numpy
 
 VERSION := 0.1
@@ -50,12 +48,17 @@ obj       = $(patsubst %,$(1)/%.o,$(2))
 Q  := $(if $(V),,@)
 say = $(if $(V),,@printf '  %-5s %s\n' $(1) $(2))
 
+#: make            build pathtracer and assay
 all: $(BUILD)/pathtracer $(BUILD)/assay $(BUILD)/oiio.so
 
+#: make validate   judge the suite against the stored references; LIVE=1: render them now;
+#:                 ONLY="SCENE ...": some scenes; ALPHA=1e-3: chance of any wrong verdict
 validate: all $(if $(LIVE),$(BUILD)/deps-live)
 	$(BUILD)/assay validate --out $(BUILD)/report --alpha $(ALPHA) \
 	  $(if $(LIVE),--live) $(addprefix --only ,$(ONLY))
 
+#: make golden     render what is missing or out of date in golden/, approve what is new or
+#:                 EQUIVALENT, list what differs (ONLY="SCENE ...": of some scenes)
 golden: all $(BUILD)/deps-live
 	$(BUILD)/assay golden render --golden golden --out $(BUILD)/golden-candidate --work $(BUILD)/work \
 	  $(addprefix --only ,$(ONLY))
@@ -63,44 +66,17 @@ golden: all $(BUILD)/deps-live
 	  $(addprefix --only ,$(ONLY))
 	$(BUILD)/assay golden approve --all --new --golden golden --from $(BUILD)/golden-candidate $(ONLY)
 
-# tools/RESULTS.md from the last `make validate` (and assay converge -o $(BUILD)/converge).
+#: make results    tools/RESULTS.md from the last validation (and assay converge -o BUILD/converge)
 results: all
 	tools/results.sh $(BUILD) >$(BUILD)/RESULTS.md && cp $(BUILD)/RESULTS.md tools/RESULTS.md
 
+#: make report     make the page of the last validation again
 report: all
 	$(BUILD)/assay report $(BUILD)/report/results.json
 
-# A zip to upload to Gradescope, which grades by RUBRIC.
-autograder: all $(BUILD)/deps-test
-	tools/autograder/pack.sh $(BUILD) $(RUBRIC) $(BUILD)/autograder.zip '$(COMMIT)' $(DEPS)
-
+#: make deps       install the Debian packages that building needs
 deps: $(BUILD)/deps
 deps-live: $(BUILD)/deps-live
-
-share := $(DESTDIR)$(PREFIX)/share/assay
-install: all library
-	install -d $(DESTDIR)$(PREFIX)/bin $(share)/cycles $(share)/import_check $(DESTDIR)$(PREFIX)/share/man/man1
-	install -m 644 renderer/pathtracer/pathtracer.1 $(DESTDIR)$(PREFIX)/share/man/man1
-	tools/packaging/manual.sh $(BUILD) $(BUILD)/manual
-	install -m 644 $(BUILD)/manual/man1/* $(DESTDIR)$(PREFIX)/share/man/man1
-	install -d $(DESTDIR)$(PREFIX)/share/bash-completion/completions $(DESTDIR)$(PREFIX)/share/zsh/site-functions
-	install -m 644 $(BUILD)/manual/bash-completion/* $(DESTDIR)$(PREFIX)/share/bash-completion/completions
-	install -m 644 $(BUILD)/manual/zsh/* $(DESTDIR)$(PREFIX)/share/zsh/site-functions
-	install -m 755 $(BUILD)/pathtracer $(BUILD)/assay $(DESTDIR)$(PREFIX)/bin
-	install -D -m 755 $(BUILD)/oiio.so $(DESTDIR)$(PREFIX)/lib/assay/oiio.so
-	install -D -m 644 tools/library/assay.h $(DESTDIR)$(PREFIX)/include/assay.h
-	install -m 755 $(BUILD)/libassay.so.$(LIBRARY_ABI) $(DESTDIR)$(PREFIX)/lib
-	ln -sf libassay.so.$(LIBRARY_ABI) $(DESTDIR)$(PREFIX)/lib/libassay.so
-	install -d $(DESTDIR)$(PREFIX)/lib/pkgconfig
-	sed 's,@PREFIX@,$(PREFIX),; s,@VERSION@,$(VERSION),' tools/library/assay.pc.in >$(DESTDIR)$(PREFIX)/lib/pkgconfig/assay.pc
-	install -m 644 reference/cycles/*.py $(share)/cycles
-	install -m 644 reference/import_check/*.py $(share)/import_check
-	install -m 644 tools/docs/formats/*.schema.json $(share)
-	cp -R reference/scenes reference/engines reference/starter golden tools/rubrics $(share)
-
-# Debian packages into BUILD/deb.
-deb: all library $(BUILD)/deps-deb
-	tools/packaging/deb.sh $(BUILD) $(VERSION) $(BUILD)/deb
 
 format:
 	clang-format -i $(wildcard renderer/*/*.[ch] reference/*/*.[ch] tools/*/*.[ch] tests/*/*.[ch] tests/*/*/*.[ch])
@@ -109,18 +85,7 @@ clean:
 	rm -rf $(BUILD)
 
 help:
-	@echo 'make            build pathtracer and assay'
-	@echo 'make validate   judge the suite against the stored references; LIVE=1: render them now;'
-	@echo '                ONLY="SCENE ...": some scenes; ALPHA=1e-3: chance of any wrong verdict'
-	@echo 'make check      unit tests under ASan and UBSan, measured error rates, end-to-end tests, lint, fuzzers'
-	@echo 'make golden     render what is missing or out of date in golden/, approve what is new or'
-	@echo '                EQUIVALENT, list what differs (ONLY="SCENE ...": of some scenes)'
-	@echo 'make report     make the page of the last validation again; make results: its table, tools/RESULTS.md'
-	@echo 'make autograder BUILD/autograder.zip for Gradescope (RUBRIC=$(RUBRIC))'
-	@echo 'make library    build/libassay.so (tools/library/assay.h); from Python: pip install --no-build-isolation tools/python'
-	@echo 'make deb        Debian packages into BUILD/deb'
-	@echo 'make install    into PREFIX=$(PREFIX); make deps: install the Debian packages that building needs'
-	@sed -n 's/^#: //p' tests/tests.mk
+	@sed -n 's/^#: //p' Makefile tools/packaging/packaging.mk $(wildcard tests/tests.mk tests/*/*.mk)
 
 define compile_c
 	$(call say,CC,$@)
@@ -150,18 +115,6 @@ $(1)/$(2)_$(3).c.o: CFLAGS += $(call isa_flags,$(3),$(2))
 $(1)/$(2)_$(3).c.o: $(2).c | $(4)
 	$$(compile_c)
 endef
-
-# libassay.so (tools/library/assay.h): what two images need, compiled so that it may lie anywhere, and called as if it could not.
-LIBRARY_ABI     := 1
-LIBRARY_SOURCES := $(wildcard $(addsuffix /*.c,$(addprefix renderer/,base math image) reference/base reference/suite \
-  $(addprefix tools/,images stats compare exact input sequential results html plots report library)) \
-  $(addprefix tools/base/,temp_dir.c text.c text_table.c) tools/validate/compare_job.c tools/validate/same_program.c)
-$(call obj,$(BUILD),$(LIBRARY_SOURCES)): CFLAGS += -fPIC -fno-semantic-interposition
-$(BUILD)/libassay.so.$(LIBRARY_ABI): $(call obj,$(BUILD),$(LIBRARY_SOURCES)) tools/library/assay.map | $(BUILD)/oiio.so
-	$(call say,LINK,$@)
-	$(Q)$(CXX) $(OPT) -shared -Wl,-soname,$(@F) -Wl,--version-script=tools/library/assay.map -Wl,-z,defs -Wl,--gc-sections \
-	  -o $@ $(filter %.o,$^) $(LIBS) -ldl && ln -sf $(@F) $(BUILD)/libassay.so
-library: $(BUILD)/libassay.so.$(LIBRARY_ABI)
 
 # Everything below one directory, with the compiler and the flags that are set for it: $(call tree,DIRECTORY,PACKAGES,KERNELS),
 # KERNELS: where its kernels come from, if not from there.
@@ -220,15 +173,14 @@ define install_missing
 endef
 $(BUILD)/deps:
 	$(call install_missing,$(DEPS))
-$(BUILD)/deps-deb: | $(BUILD)/deps
-	$(call install_missing,$(DEPS_DEB))
 $(BUILD)/deps-live: | $(BUILD)/deps
 	$(call install_missing,$(DEPS_LIVE))
 
+include tools/packaging/packaging.mk
 # Not there where a grader of submissions builds the programs (tools/autograder/pack.sh).
 -include tests/tests.mk
 
-.PHONY: all validate golden results report autograder library deb deps deps-live install format clean help FORCE
+.PHONY: all validate golden results report deps deps-live format clean help FORCE
 .SECONDARY:
 .DELETE_ON_ERROR:
 # What only prints does without: it takes a second to read them.

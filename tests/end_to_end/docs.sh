@@ -77,7 +77,7 @@ run_page() { # PAGE
     page_commands "$1" >page.sh
     grep -q . page.sh || echo "no command in $1"
     sed -n 's/^make \([a-z-]*\).*/\1/p' page.sh | while read -r target; do
-        grep -qE "^[a-z -]*\b$target\b.*:" "$top/Makefile" "$top/tests/tests.mk" || echo "make $target: no such target;"
+        grep -qE "^[a-z -]*\b$target\b.*:" "$top/Makefile" "$top"/tools/packaging/packaging.mk "$top"/tests/*.mk "$top"/tests/*/*.mk || echo "make $target: no such target;"
     done
     # shellcheck disable=SC2016
     { echo 'trap '\''s=$?; [ $s -le 2 ] || echo "$BASH_COMMAND: $s;" >&3'\'' ERR'; grep -v '^make' page.sh; } >run.sh
