@@ -1,9 +1,9 @@
-/* What the GNU Scientific Library does where it fails. */
+/* Error handling of the GNU Scientific Library (GSL). */
 #ifndef ASSAY_GSL_ERRORS_H
 #define ASSAY_GSL_ERRORS_H
 
-/* By default it ends the program by abort(). From now on, in the whole process, its functions return NULL where memory is out,
- * which all callers here look at; anything else is a bug of ours and ends the program as before, with GSL's line. */
+/* By default GSL aborts on every error. From now on, in the whole process, its functions return NULL out of memory, which all
+ * callers here check; any other error is a bug of ours and still aborts, with GSL's line. */
 void gsl_errors_of_memory_return(void);
 
 #endif

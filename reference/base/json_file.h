@@ -6,13 +6,13 @@
 
 #include <jansson.h>
 
-/* json_load_file() of a regular file; what else there is, as a FIFO, for which it would wait, cannot be opened. */
+/* json_load_file() of a regular file; a FIFO, say, fails to open. A new reference; NULL, and why in *why. */
 json_t *json_read(const char *path, size_t flags, json_error_t *why);
 
-/* The same without duplicates among members; NULL with a line, "FILE:LINE: why", or "FILE: why" where it cannot be opened. */
+/* The same, members may not repeat; NULL with the line "FILE:LINE: why", or "FILE: why" where it cannot be opened. */
 json_t *json_read_or_say(const char *path, struct err *e);
 
-/* The object in it; an empty one if there is no file. */
+/* A new reference; {} without a file; NULL: error. */
 json_t *json_read_object(const char *path, struct err *e);
 
 /* Writes by rename, indented, with a final newline; makes the directories above it. */

@@ -11,7 +11,7 @@ struct process {
     const char *cwd;         /* NULL: the current one */
     const char *log;         /* file that receives stdout and stderr, at most 64 MiB; NULL: none */
     size_t
-        log_most; /* bytes of it, instead, in which control characters become '?', as nobody vouches for them; 0: as it comes */
+        log_most; /* its limit in bytes instead; control characters then become '?'; 0: 64 MiB, unchanged */
     /* Called in the new process before it becomes the program, with calls that may follow fork() alone; false, with
      * errno: it is not started. May be NULL. */
     bool (*before)(const void *ctx);

@@ -4,8 +4,8 @@
 
 #include <stdbool.h>
 
-/* From now on, in this thread, a complaint sets *failed and is not printed: where memory is out libxml2 would write a line of
- * its own on stderr. NULL: as in the beginning; what the library keeps of the last complaint is given back. */
+/* From now on, in this thread, an error of libxml2 sets *failed and is not printed; out of memory it would print a line of its
+ * own. NULL: restores the defaults and frees what libxml2 keeps of the last error. */
 void xml_errors_to(bool *failed);
 
 #endif

@@ -7,8 +7,8 @@
 /* The words before "--" of every command. */
 #define BLENDER_RUN "blender -b --factory-startup -noaudio --python-exit-code 3 -P "
 
-/* Runs a command, in which the script's base name stands for the file `script` of share_dir, in the directory dir, where what it prints
- * becomes blender.log. */
+/* Runs a command in dir, output to dir/blender.log. The base name of `script` in it becomes the full path of
+ * share_dir/script. Fails as process_run(). */
 NODISCARD bool blender_run(const char *command, const char *share_dir, const char *script,
                            const char *dir, double timeout_s, struct err *e);
 

@@ -41,8 +41,8 @@
 #include "renderer/scene/camera.h"
 
 /* Writes the dump, an environment's image to <path>.exr and texture N's to <path>.textureN.exr, each by rename. Fails on a write error,
- * and with a line that starts with "Cycles: " on what our recipe for Cycles cannot express: pixels
- * that are not square, an angle of view out of Blender's range, clipping planes that cut geometry, a
+ * and with a line that starts with "Cycles: " on what we cannot express in Cycles: an orthographic
+ * camera, pixels not square, an angle of view beyond Blender's range, clipping planes that cut, a
  * depth above 1025, shading normals of one triangle on both of its sides, a microfacet or a
  * highlight that takes facets (all but GGX, separable, of constant reflectance, alpha 0.01 to 1) where there are lights that
  * no ray runs into: point, spot, directional, the assignment's ambient light. */

@@ -16,7 +16,7 @@ static bool print_povray(const struct scene *s, const struct camera *c, int dept
     return export_povray(s, c, depth, &plain, f, e);
 }
 
-/* One of the two; print() of a scene that is one text file, which is opened and renamed here. */
+/* Either write(), or print() into a single text file, which is opened and renamed here. */
 static const struct {
     const char *name;
     bool (*write)(const struct scene *s, const struct camera *c, int depth, const char *path,

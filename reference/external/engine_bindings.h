@@ -7,8 +7,8 @@
 /* NULL if there is none of that name. */
 const struct engine_driver *engine_driver_of(const char *engine);
 
-/* Writes the scene for an engine of the table: path by rename, last; files that it names lie beside it, are called after it and
- * are written before it. False with one line: a file that cannot be written, or what the engine cannot express. */
+/* Writes the scene for an engine of the table: first the files that it names, beside path and named after it, then path, by
+ * rename. False with one line on a write error or on what the engine cannot express. */
 NODISCARD bool engine_export(const struct engine_kind *kind, const struct scene *s,
                              const struct camera *c, int depth, const char *path, struct err *e);
 

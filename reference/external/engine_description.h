@@ -41,7 +41,7 @@ struct engine_options {
     bool check_independence;
 };
 
-/* Fails, naming file and key, on anything that is not as above: unknown keys and placeholders, values
+/* Fails, naming file and key, on what engine.md does not allow: unknown keys and placeholders, values
  * of the wrong type, a command without {scene} or {out}, "mean" without {seed}. */
 NODISCARD bool engine_load(const char *path, struct engine *out, struct err *e);
 void engine_free(struct engine *en);

@@ -21,7 +21,7 @@ struct engine_job {
     json_t *independence; /* with opt->check_independence: what the manifest gets; else NULL */
 };
 
-/* Checks that the engine can, and writes the scene to paths[0], or in grey one for each channel; for a .dae only fills paths[0]. */
+/* Checks the features and writes the scene to paths[0], or a grey one for each channel; of a .dae only fills paths[0]. */
 NODISCARD bool engine_write_scene(const struct engine *en, const struct suite_scene *suite,
                                   const char *dir, char paths[3][PATH_SIZE], struct err *e);
 

@@ -7,9 +7,9 @@
 
 /* Writes path (by rename, last) and, before it, STEM_object_I.ply, STEM_material_I_eta.exr, .._k.exr
  * and STEM_environment.exr as needed, STEM being path without its ending. Samples and seed are the
- * parameters $spp and $seed. Fails with one line on what Mitsuba cannot express: a boundary that only
- * refracts, Schlick's approximation, correlated shadowing, emission on both sides, smooth emitters
- * that reflect, and what features_check_exportable() refuses. */
+ * parameters $spp and $seed. Fails with one line on what Mitsuba cannot express: refraction alone,
+ * plastic, Schlick's form, correlated shadowing, two-sided emission, smooth emitters that reflect,
+ * pixel filters, and what features_check_exportable() refuses. */
 NODISCARD bool export_mitsuba(const struct scene *s, const struct camera *c, int depth,
                               const char *path, struct err *e);
 

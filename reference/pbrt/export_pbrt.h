@@ -8,7 +8,7 @@
 /* Writes path (by rename, last) and, before it, an environment's image to STEM_environment.exr, STEM being path without its
  * ending; samples, seed and the image's name come from pbrt's command line. Fails with one line on what pbrt cannot express:
  * mirrors and metals without an index of refraction that have a colour, Beckmann's distribution, separable shadowing, tinted
- * glass, a boundary that only refracts, Schlick's approximation, environment images of more than 512 rows, and what
+ * glass, refraction alone, plastic, Schlick's approximation, environment images of more than 512 rows, and what
  * features_check_exportable() refuses. */
 NODISCARD bool export_pbrt(const struct scene *s, const struct camera *c, int depth,
                            const char *path, struct err *e);

@@ -40,8 +40,8 @@ struct povray_passes {
 };
 
 /* Looks the scene over for images with paths of 0 .. depth bounces. Fails if POV-Ray cannot
- * express it: lens, clipping planes that cut geometry, microfacets, point and spot lights whose
- * falloff is neither constant nor purely quadratic, the assignment's hidden ambient light,
+ * express it: lens, orthographic camera, pixel filter, clipping planes that cut, metals, plastic,
+ * falloffs neither constant nor quadratic, the assignment's hidden ambient light,
  * environment images of more than POVRAY_MOST_TEXELS rows or columns, textures that povray_texture.h
  * refuses, an emitter that reflects no
  * red, green or blue but emits it while reflecting others, glass that povray_glass.h refuses, depth

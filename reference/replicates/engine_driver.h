@@ -1,4 +1,4 @@
-/* What an engine's driver gets to do its part of reference_render(), and what it has to offer. */
+/* An engine's driver: what reference_render() hands to it, and what it has to implement. */
 #ifndef ASSAY_ENGINE_DRIVER_H
 #define ASSAY_ENGINE_DRIVER_H
 
@@ -51,7 +51,7 @@ struct engine_driver {
      * Calls opt->on_replicate. */
     bool (*fold)(const struct reference_job *job, const struct replicate_images *images,
                  const json_t *said, struct moments *out, json_t *manifest, struct err *e);
-    /* A file that says all that decides the images, beside the program, the scripts and what the suite asks for. */
+    /* Writes to path what decides the images besides the program, the scripts and the suite's settings. */
     bool (*write_key)(const struct reference_job *job, const char *path, struct err *e);
 };
 

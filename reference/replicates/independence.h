@@ -51,7 +51,7 @@ void replicates_free(struct replicates *r);
  * rendered again and again, and a replicate that was used twice is seen at any alpha. */
 #define INDEPENDENCE_ALPHA 1e-6
 
-/* An interval is too narrow by the square root of this, at most, without anybody being told. */
+/* An interval may be too narrow by at most the square root of this before the test fails. */
 #define SQUARES_VARY_MOST 1.5
 
 struct independence {

@@ -18,7 +18,7 @@ void replicate_images_path(const char *dir, const char *prefix, int number,
     snprintf(path, REPLICATE_IMAGE_PATH, "%s/%s_%04d.exr", dir, prefix, number);
 }
 
-/* Of any file that is read where `half` is asked for, else of EXR with 32 bits. */
+/* half not NULL: any format that image_read() takes; NULL: EXR of 32 bits. */
 static float *read_rgb(const char *path, int width, int height, bool below_zero, double scale,
                        bool *half, struct err *e)
 {

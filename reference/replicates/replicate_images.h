@@ -24,8 +24,8 @@ void replicate_images_path(const char *dir, const char *prefix, int number,
  * not finite or, without `below_zero`, negative. */
 NODISCARD float *replicate_images_read(const char *path, int width, int height, bool below_zero,
                                        struct err *e);
-/* The same of any format that is read and of any finite values, times scale; *half is set where the file has fewer than 32 bits. Values
- * may be negative: a renderer of spectra has colours outside the gamut, and only their mean has to make sense. */
+/* The same for any format that image_read() takes, values times scale; sets *half if the file has fewer than 32 bits, never clears
+ * it. Values may be negative: spectral renderers have colours outside the gamut; only the mean has to make sense. */
 NODISCARD float *replicate_images_read_any(const char *path, int width, int height, double scale,
                                            bool *half, struct err *e);
 /* The same bits as a file, which appears whole. */
@@ -42,7 +42,7 @@ struct replicate_repeats {
     uint8_t (*digest)[32];
 };
 NODISCARD bool replicate_repeats_alloc(struct replicate_repeats *r, int capacity, struct err *e);
-/* Takes the next image; the number of the first that was the same, its own if there is none. */
+/* Adds an image; returns the number of the first equal one, its own if there is none. */
 int replicate_repeats_add(struct replicate_repeats *r, const float *pixels_rgb, size_t pixels);
 void replicate_repeats_free(struct replicate_repeats *r);
 

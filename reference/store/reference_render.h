@@ -92,8 +92,8 @@ NODISCARD bool golden_orphans(const char *golden_dir, const struct suite *suite,
                               struct err *e);
 
 /* Hash of all that decides the bits of an engine's reference on one machine: scene, settings, seed, the
- * files that the exporter writes, cycles.py, the engine's binary. A stored reference with this "key" in
- * its manifest need not be rendered again. Fails if the engine is absent or cannot express the scene. */
+ * driver's key file, its scripts, the engine's binary. A stored reference with this "key" in its
+ * manifest need not be rendered again. Fails if the engine is absent or cannot express the scene. */
 NODISCARD bool reference_key(const struct suite_scene *scene, const struct suite_reference *ref,
                              const struct reference_options *opt, char key[65], struct err *e);
 

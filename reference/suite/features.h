@@ -42,7 +42,7 @@ extern const char *const feature_texts[NUM_FEATURES];     /* for people */
 /* Bit 1 << enum feature of all that image needs. */
 unsigned features_of_scene(const struct scene *s, const struct camera *c);
 
-/* Has one of these triangles shading normals that are not its geometric normal, but for the rounding of text? */
+/* Does a shading normal of these triangles differ from the geometric one by more than the rounding of text? */
 bool features_are_smooth(const struct scene *s, uint32_t first, uint32_t num);
 
 /* Distances from the eye: no more than that of the nearest point of the scene (a triangle counts with
@@ -60,9 +60,9 @@ extern const char *const features_material_names[NUM_MATERIAL_KINDS];
  * where there is none: */
 NODISCARD bool features_check_clipping(const char *engine, const struct scene *s,
                                        const struct camera *c, struct err *e);
-/* For engines that clip by depth, we by distance. Where each primitive in front of the camera lies wholly before the near
- * plane, wholly beyond the far one, or wholly between, and depths tell the same primitives apart: those depths; 0 and
- * INFINITY where a plane cuts off nothing. Else fails as features_check_clipping(). */
+/* Planes for engines that clip by depth; ours clip by distance. They exist if each primitive in front of the camera lies
+ * wholly before the near plane, between, or beyond the far one, and depths separate the same primitives; 0 and INFINITY
+ * where a plane cuts nothing. Else fails as features_check_clipping(). */
 NODISCARD bool features_clip_depths(const char *engine, const struct scene *s,
                                     const struct camera *c, double *near, double *far,
                                     struct err *e);
@@ -72,8 +72,8 @@ NODISCARD bool features_check_axes(const char *engine, const struct camera *c, s
 NODISCARD bool features_check_normals(const char *engine, const struct scene *s, struct err *e);
 /* Where a material has a texture. */
 NODISCARD bool features_check_textures(const char *engine, const struct scene *s, struct err *e);
-/* Axes, clipping, normals and textures; a falloff that is not the inverse square, spot lights that are brighter in the middle, the
- * ambient light of the assignment. */
+/* Axes, clipping, normals, textures; orthographic cameras, falloffs other than the inverse square, spot lights with an
+ * exponent, the assignment's ambient light. */
 NODISCARD bool features_check_exportable(const char *engine, const struct scene *s,
                                          const struct camera *c, struct err *e);
 

@@ -10,8 +10,8 @@
 #include <stdint.h>
 #include <stdio.h>
 
-/* A number above 0 is times the value of the unit (one character) behind it or, without one, of the
- * last, whose name is NULL. */
+/* A number above 0 is multiplied by the value of its suffix (one character) or else by that of the
+ * row with a NULL name. */
 struct cli_unit {
     const char *name;
     double value;
@@ -31,9 +31,9 @@ enum cli_kind {
     CLI_REST
 };
 
-/* A row: where the value goes stands in a member of the command's settings, whose type says how it
- * is read. A table ends with a row without a name, which is about the words that are no options:
- * {0} if the command takes none. */
+/* A row. The value goes to a member of the command's settings, whose type says how it is read. A
+ * table ends with a row without a name, which describes the positional arguments: {0} if the
+ * command takes none. */
 struct cli_option {
     char short_name;       /* 0: none */
     const char *long_name; /* without dashes */
@@ -98,9 +98,9 @@ enum { CLI_END = -1, CLI_POSITIONAL = -2, CLI_ERROR = -3 };
  * argument, and short options without any may stand together, as getopt has it. */
 int cli_next(struct cli *c, struct err *e);
 
-/* The words of a command that parsed, each short option and its argument by itself ("-qj4" as "-q
- * -j 4"), for who stores commands or leaves words out: a NULL-terminated array that points into
- * argv too, to free(). NULL: out of memory. */
+/* The words of a command that parsed, with short options split ("-qj4" into "-q -j 4"), for callers
+ * that store commands or drop words: a NULL-terminated array, to free(), that points into argv too.
+ * NULL: out of memory. */
 NODISCARD char **cli_apart(const struct cli_option *options, int argc, char **argv);
 
 /* Prints the text and then the table in two columns on stdout. */
@@ -119,9 +119,9 @@ NODISCARD bool cli_double(const char *what, const char *text, double lo, double 
 NODISCARD bool cli_choice(const char *what, const char *text, const char *const *words, int *out,
                           struct err *e);
 
-/* Of the words that `next` gives for 0, 1, .. until NULL the one that was probably meant: the
- * fewest letters to change, insert, leave out or exchange with their neighbours, at most a third of
- * them; NULL: none. */
+/* Of the words next(list, i), i = 0, 1, .. until NULL, the one probably meant: with the fewest
+ * letters to change, insert, drop or swap with their neighbours, at most a third of them; NULL:
+ * none. */
 const char *cli_nearest(const char *word, const char *(*next)(const void *list, size_t i),
                         const void *list);
 

@@ -17,7 +17,7 @@ extern const struct option_words cli_rewrite_render[];
 bool cli_rewrite_has_word(int argc, char *const *argv, const char *short_name,
                           const char *long_name);
 
-/* Into kept[], with room for num, the words that the table does not leave out; how many. kept may be word. */
+/* Copies to kept[] (room for num; may be word) the words that the table does not drop; returns how many. */
 int cli_rewrite_kept(const struct option_words *table, int num, char *const *word, char **kept);
 
 #endif

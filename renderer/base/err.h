@@ -23,9 +23,8 @@ bool err_set(struct err *e, const char *fmt, ...) __attribute__((format(printf, 
  * returns false. */
 bool err_prefix(struct err *e, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
 
-/* Whether the line says that memory ran out, in our words or those of the C library and of OpenEXR:
- * then it tells nothing of the file that was looked at. For those who take a failure for somebody
- * else's fault. */
+/* Does the line say that memory ran out, in our words or those of the C library or OpenEXR? Then it
+ * says nothing about the file that was read. For callers that would otherwise blame that file. */
 bool err_is_of_memory(const struct err *e);
 
 /* Each control character becomes a '?'. What a file or a library said may end up in a line: a terminal must not obey

@@ -7,7 +7,7 @@
 #include <limits.h>
 #include <stdio.h>
 
-/* A path put together from parts. One that is too long for the system is cut where it still is: every use of it fails, none
+/* A path put together from parts. If too long for the system it is cut, but stays too long: every use of it fails, none
  * touches another file. */
 struct path {
     char s[PATH_MAX + 1];
@@ -28,12 +28,12 @@ NODISCARD bool out_open(struct out_file *o, const char *path, struct err *e);
 NODISCARD bool out_commit(struct out_file *o, struct err *e);
 /* Closes and removes the temporary. */
 void out_abandon(struct out_file *o);
-/* Whether a file could be begun at path, for who asks before hours of work: false with the line of out_open(), or where a
- * directory has the name. Leaves nothing. */
+/* Can a file be written at path? To ask before hours of work. False with the line of out_open(), or if path is a directory.
+ * Leaves nothing behind. */
 NODISCARD bool out_check(const char *path, struct err *e);
 
-/* A regular file, or a directory, for reading; NULL with errno: a FIFO would be waited for, a device may have no end (ENOTSUP). The
- * caller closes it. */
+/* Opens a regular file or a directory for reading. NULL with errno: ENOTSUP for a FIFO (would block) or a device (may not end).
+ * The caller closes it. */
 FILE *fs_open(const char *path);
 /* The same as a descriptor; -1. */
 int fs_open_fd(const char *path);

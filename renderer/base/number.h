@@ -7,7 +7,7 @@
 #include <stdbool.h>
 
 /* A finite decimal number that ends at a blank or at the end of the text: *out as strtod() rounds it in the C
- * locale, and where it ends. False on anything else; hexadecimal, "nan" and "inf" are. */
+ * locale, *end where it ends. False on anything else, also hexadecimal, "nan", "inf". */
 NODISCARD bool number_parse(const char *s, const char **end, double *out);
 
 #endif

@@ -4,8 +4,8 @@
 
 #include "err.h"
 
-/* `first`, unless it is NULL, and the words of a NULL-terminated array, a blank between two, in quotes where a shell would need
- * them: as long as it takes, to free(). NULL if out of memory. */
+/* Joins `first`, unless it is NULL, and the words of a NULL-terminated array with blanks, in quotes where a shell needs them.
+ * The caller frees the text. NULL if out of memory. */
 NODISCARD char *shell_quote_join(const char *first, const char *const *word);
 
 /* The words of a text that shell_quote_join() made, or that a person typed with blanks, '...' and \ alone: a NULL-terminated

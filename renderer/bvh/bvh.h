@@ -1,6 +1,6 @@
-/* Ray queries, the nearest hit and occlusion: over all primitives of a
- * scene, by brute force or by a binary bounding volume hierarchy. Rays come in batches, so that
- * wider kernels can take their place behind the same interface. */
+/* Ray queries, the nearest hit and occlusion, over all primitives of a scene: by brute force, or by
+ * a bounding volume hierarchy, binary or eight wide. Rays come in batches, so that vector kernels
+ * fit behind the same interface. */
 #ifndef ASSAY_BVH_H
 #define ASSAY_BVH_H
 
@@ -15,8 +15,8 @@ enum bvh_kind {
     BVH_WIDE         /* eight wide, by vector kernels (bvh_wide.h) */
 };
 
-/* What the rays of one thread cost. BVH_WIDE counts nodes and leaves, of up to eight each, and those
- * that a packet of rays visits together once. */
+/* What the rays of one thread cost. BVH_WIDE counts nodes and leaves (of up to eight boxes or
+ * primitives); a packet's visit counts once. */
 struct bvh_stats {
     uint64_t rays, box_tests, primitive_tests;
 };

@@ -12,7 +12,7 @@
 
 enum { FLAT_CORNERS = 3 * WIDE_FLAT, FLAT_EDGES = 3 * WIDE_FLAT, FLAT_ROW = 16 };
 
-/* normal.p = offset on the plane; u = u_row.p + u_row[3] and v the like, 0 to 1 inside. */
+/* normal.p = offset on the plane; u = u_row.p + u_row[3], v likewise; 0 to 1 inside. */
 struct flat_face {
     float normal[3], offset, u_row[4], v_row[4];
     float per_area;   /* 1 over that of the parallelogram of u and v */

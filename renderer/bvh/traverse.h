@@ -13,7 +13,7 @@ struct traverse {
                      int num_lanes, bool *occluded, struct bvh_stats *stats);
 };
 
-/* The like for the list alone. left: the lanes that the tree is for, whose results are not the last yet; how many. */
+/* The same for the list alone. Returns how many lanes it puts into left[]: those that still need the tree. */
 struct small_scene_trace {
     int (*closest)(const struct wide *w, const struct rays *r, const uint16_t *lane, int num_lanes,
                    struct hits *h, uint16_t *left, struct bvh_stats *stats);

@@ -9,8 +9,8 @@
 /* A node leaves at most seven of its children behind; 64 free levels and 32 of halving. */
 enum { STACK = 7 * 104 };
 
-/* A node or leaf that waits: the bits of the distance where it begins, and its reference. As numbers
- * they are in order of distance as far as that is positive; elsewhere only the order of visits
+/* A waiting node or leaf: the bits of the distance at which a ray enters it, and its reference. As
+ * integers they sort by distance where that is positive; elsewhere only the order of visits
  * suffers. */
 typedef int64_t stacked;
 

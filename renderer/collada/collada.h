@@ -12,8 +12,8 @@
 NODISCARD bool collada_load(const char *path, enum dialect dialect, struct scene *out,
                             struct err *e);
 
-/* The same for a document of `size` bytes in memory, the first zero being its end, which may not refer to other files;
- * path is only its name in error lines and where its images are beside. */
+/* The same for a document of at most `size` bytes in memory, ended by the first zero. It may not refer to other files;
+ * path is its name in error lines, and its images lie beside that. */
 NODISCARD bool collada_parse(const char *text, size_t size, const char *path, enum dialect dialect,
                              struct scene *out, struct err *e);
 

@@ -1,6 +1,6 @@
-/* What the files of the COLLADA loader share: the loader's state, the reading of XML
- * (collada_xml.c, collada_text.c), of meshes (collada_mesh.c), materials (collada_material.c),
- * lights (collada_light.c), cameras (collada_camera.c), and the growing scene (collada_build.c).
+/* What the files of the COLLADA loader share: the loader's state, then the functions of each file
+ * below its name: XML (collada_xml.c, collada_element.c, ..), the parts of a document
+ * (collada_mesh.c, ..), and the growing scene (collada_build.c).
  *
  * The first failure puts "path:line: what" into loader.err and sets loader.failed; later ones change nothing. Readers go
  * on with zeros, black and NULL, which the functions of collada_element.c take for an element, and look at `failed` before
@@ -160,8 +160,8 @@ bool element_is(const xmlNode *n, const char *name);
 int element_place_among(const char *name, const char *words);
 /* Is its name one of the words? */
 bool element_is_one_of(const xmlNode *n, const char *words);
-/* Fails unless the children of n are as a document type definition would have them, but in any order: NAME, one; NAME?, at
- * most one; NAME*, any number; A|B, one of either name; *, whatever else. */
+/* Fails unless the children of n match `words`, blanks between, in any order: NAME, one; NAME?, at most one; NAME*, any
+ * number; A|B, one of either name; *, whatever else. */
 bool element_check(struct loader *ld, const xmlNode *n, const char *words);
 /* The attribute's value or NULL; lives in the document. */
 const char *element_attribute(const xmlNode *n, const char *name);
@@ -203,7 +203,7 @@ int field_choice(struct loader *ld, const xmlNode *n, const char *name, const ch
 
 /* collada_reference.c: NULL is a failure. */
 
-/* The element of that id in the document of n, who is to blame; it must be called `element`. */
+/* The `element` with that id in the document of n, whose line an error names. */
 const xmlNode *reference_find(struct loader *ld, const xmlNode *n, const char *id,
                               const char *element);
 /* The element that attribute `name` points to, by "#id" or "file.dae#id", which is read from beside
@@ -258,15 +258,15 @@ void build_copy_name(char *out, size_t size, const char *name);
 uint32_t build_add_material(struct loader *ld, const struct material *m);
 void build_add_light(struct loader *ld, const struct light *l);
 vec3 build_to_float(dvec3 v);
-/* The point in the world; n and `what` it is are to blame if that is too far. */
+/* In world space. Fails, naming n and `what`, if beyond FARTHEST. */
 vec3 build_place(struct loader *ld, const xmlNode *n, const char *what, const mat4 *m, dvec3 p);
 /* A unit vector along v, of n. */
 vec3 build_direction(struct loader *ld, const xmlNode *n, dvec3 v);
 /* A new object that the following triangles and spheres belong to. */
 void build_begin_object(struct loader *ld, const char *name, const char *symbol, uint32_t material,
                         bool is_lamp);
-/* One triangle of the object begun last, through the transform, whose determinant has that sign.
- * `n` is who to blame. uv: of the three; NULL: of no use. */
+/* Adds a triangle to the object begun last, by the transform m, whose determinant has that sign.
+ * Errors name n. uv: of the three; NULL: not needed. */
 void build_add_triangle(struct loader *ld, const xmlNode *n, const mat4 *m, double sign,
                         const struct corner c[3], const struct uv uv[3]);
 void build_add_sphere(struct loader *ld, const xmlNode *n, const mat4 *m, double radius,

@@ -18,7 +18,7 @@ void exr_zip_free(struct exr_zip *z);
 const void *exr_zip_rows(struct exr_zip *z, const float *rows, int num, size_t *size);
 
 /* The num rows that such a chunk holds as they lie in it: channel after channel within a row. They belong to z and last
- * until the next call. NULL: the bytes are none. */
+ * until the next call. NULL: not a valid chunk. */
 const float *exr_zip_unpack(struct exr_zip *z, const void *bytes, size_t size, int num);
 
 #endif

@@ -51,7 +51,7 @@ NODISCARD bool image_read_exr(const char *path, struct image *out, bool *half, s
 /* The same by rows, of an image that need not be in memory as a whole. NULL with a line on failure; `path` has to last. */
 struct image_reader;
 NODISCARD struct image_reader *image_reader_open(const char *path, struct err *e);
-/* Shape, names and attributes: the reader's, or whose who takes and zeroes it after the last row. */
+/* Shape, names, attributes: the reader's; the caller may take and zero it after the last row. */
 struct image *image_reader_head(struct image_reader *r);
 bool image_reader_is_half(const struct image_reader *r);
 /* The next *num rows, as many as the file packs together: channel after channel within a row. They belong to the reader and

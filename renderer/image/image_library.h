@@ -1,6 +1,6 @@
-/* What reads one image at a time: libpng (image_png.c), and OpenImageIO for all else, which is the one part in C++ (oiio.cc, in a
- * file of its own). For image_oiio.c, which decides what is read by which. No exception crosses this line; texts that say
- * why are cut at `size`. */
+/* A library that reads images: libpng (image_png.c), or OpenImageIO for all else (oiio.cc, the one part in C++, in a shared
+ * object of its own). image_oiio.c decides which reads what. No exception crosses this interface; texts that say why are cut
+ * at `size`. */
 #ifndef ASSAY_IMAGE_LIBRARY_H
 #define ASSAY_IMAGE_LIBRARY_H
 

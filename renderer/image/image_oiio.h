@@ -31,7 +31,7 @@ struct image_info {
     char format[16];      /* OpenImageIO's name: "openexr", "png", "hdr", "pnm" (PFM too), .. */
     enum image_type type; /* the smallest of its channels */
     int bytes;            /* of one value of that channel */
-    double power;    /* of stored numbers that is linear, IMAGE_SRGB for that curve; for textures */
+    double power;    /* exponent that makes stored numbers linear, or IMAGE_SRGB; for textures */
     int orientation; /* as in Exif: 1 is row 0 at the top, from left to right */
     int parts;       /* images in one file (EXR parts), 1 .. */
     int width, height, channels; /* of OpenEXR: of the display window */

@@ -23,8 +23,8 @@ struct moments {
      * pixel, absolute, in the same direction in all pixels at worst. NULL: not at all. Lives in
      * memory only: no file has it, and moments_merge() refuses it. */
     double *tolerance;
-    /* The same as the floats of a file, half as much memory, where n to m3 are NULL: only for who reads them by
-     * moments_n() to moments_m3(), moments_run() or moments_unpack() (comparisons). */
+    /* The same as float32, in half the memory; n to m3 are then NULL. Only for comparisons, which read by
+     * moments_n() to moments_m3(), moments_run() or moments_unpack(). */
     struct {
         float *n, *mean, *m2, *m3;
     } packed;
@@ -66,8 +66,7 @@ NODISCARD bool moments_merge(struct moments *dst, const struct moments *src, str
 struct moments moments_run(const struct moments *m, size_t first, int num);
 /* Rows y .. y+num-1. Owns nothing. */
 struct moments moments_rows(const struct moments *m, int y, int num);
-/* Groups of `k` samples are not kept apart, so the variance of the pixel's mean is M2/(n(n-1));
- * NAN if n < 2 or stratified, 0 if exact. channel 0..2. */
+/* Variance of the pixel's mean, M2/(n(n-1)); NAN if n < 2 or stratified, 0 if exact. channel 0..2. */
 double moments_var_of_mean(const struct moments *m, size_t pixel, int channel);
 
 /* A moments EXR: channels R G B (the mean), M2.R M2.G M2.B, M3.R M3.G M3.B, n; text attributes
@@ -98,7 +97,7 @@ NODISCARD bool moments_read(const char *path, struct moments *out, struct image 
                             struct err *e);
 /* The same, packed. */
 NODISCARD bool moments_read_packed(const char *path, struct moments *out, struct err *e);
-/* What is packed as doubles, in place. Fails only out of memory. */
+/* Unpacks to doubles, in place. Fails only out of memory. */
 NODISCARD bool moments_unpack(struct moments *m, struct err *e);
 
 #endif

@@ -7,8 +7,8 @@
 
 #include <stdint.h>
 
-/* Rows are longer than a batch: vectors may read and write a little behind its end, and rows of 1024
- * bytes would all fall into the same few sets of the first cache. */
+/* Rows are longer than a batch: vectors may read and write a little past its end, and rows of 1024
+ * bytes would all map to the same few sets of the L1 cache. */
 enum { BATCH_LANES = 256, BATCH_ROOM = BATCH_LANES + 16 };
 
 #define NO_HIT UINT32_MAX

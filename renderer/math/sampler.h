@@ -37,7 +37,7 @@ struct sample4 {
 enum sampler_purpose {
     PURPOSE_CAMERA = 0, /* u[0..1] place in the pixel, u[2..3] place on the lens */
     PURPOSE_BSDF = 0,   /* u[0..1] direction, u[2] lobe, u[3] Russian roulette */
-    PURPOSE_LIGHT = 1   /* u[0..1] place on the light or direction, u[2] which triangle */
+    PURPOSE_LIGHT = 1   /* u[0..1] place, u[2] triangle, u[2..3] sky region, u[3] light */
 };
 
 /* The raw generator, `rounds` rounds (10 everywhere but in its test). */

@@ -7,7 +7,7 @@
 
 enum { PHILOX_ROUNDS = 10 };
 
-/* What the rounds mix in, made once for many numbers. */
+/* The round keys, made once for many numbers. */
 struct philox_keys {
     uint32_t k[PHILOX_ROUNDS][2];
 };
@@ -43,7 +43,7 @@ INLINE void philoxv(vu pixel, vu sample, uint32_t vertex, uint32_t purpose,
     out[3] = vu_of(c3);
 }
 
-/* Bits of a number, counted from the lowest, whose place has bit k clear. */
+/* Mask of the bits of a word whose index (0: lowest) has bit k clear. */
 #define PLACES(k)                                                                                  \
     ((k) == 0   ? 0x55555555u                                                                      \
      : (k) == 1 ? 0x33333333u                                                                      \

@@ -11,7 +11,7 @@
  *   vf_hypot                sqrt(a a + b b) by way of double
  *   vf_lt, vf_le, vf_eq, vi_lt, vi_eq, vf_select
  *   bits, lanes_of          a mask as an integer, bit k for lane k; and back
- *   front_order, pick       the lanes of a mask, in order, and the numbers in that order: brings them to the front
+ *   front_order, pick       the lanes of a mask, in order; pick() moves these lanes of a vector to the front
  *   store_flags             a mask as bytes of 0 or 1
  *   spread_flags            such bytes for the lanes of a mask alone, in order: as bits of these lanes
  *   vu_reverse_bits         the lowest bit becomes the highest

@@ -20,7 +20,7 @@ struct output {
 NODISCARD bool output_images(const struct output *o, const struct film *f,
                              const struct render_stats *stats, struct err *e);
 
-/* Whether all of these, and the state, could be begun: asked before the render starts. */
+/* Can all of these files, and the state, be written? Asked before the render starts. */
 NODISCARD bool output_check(const struct output *o, struct err *e);
 
 /* For a film that output_images() could not write, for the reason in e: writes all images under names that no

@@ -18,8 +18,8 @@ static inline bool starter_has(const struct scene *s, enum cs184_deviation what)
     return (s->starter >> what & 1) != 0;
 }
 
-/* Sets s->starter to `bits` (1 << enum cs184_deviation), and turns the lamps that are seen, so that what is sampled stays as in the
- * file, and changes the kind of rough metals. Only rectangles, lights of two triangles, are turned; once. Before the hierarchy is built. */
+/* Sets s->starter to `bits` (1 << enum cs184_deviation), turns the visible rectangle lamps (two triangles each; sampling still
+ * follows the file) and changes the kind of rough metals. To be called once, before the hierarchy is built. */
 void cs184_deviations_apply(struct scene *s, unsigned bits);
 
 /* The point of a rectangle that stands for p of the turned one: by 90 degrees about its centre, in its plane. */

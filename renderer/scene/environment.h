@@ -5,12 +5,11 @@
  *
  * Radiance is interpolated between the centres of texels, around the circle of longitude and
  * constant beyond the centres of the first and last row, so that a coarse map shows no squares to a
- * camera or in a mirror. Directions are chosen for a surface: first a region of up to 16 x 32, by
- * its luminance times solid angle times about its cosine with the surface's normal, which is
- * rounded; in it a cell that the centres of texels span, by the mean luminance of the cell's
- * corners times its solid angle; then uniformly in solid angle within the cell. That density is
- * exact, and positive wherever light comes to that side. Of a constant, directions are chosen by
- * the cosine. */
+ * camera or in a mirror. A direction is sampled for a surface: first one of up to 16 x 32 regions, by
+ * its luminance times solid angle times about its cosine with the rounded surface normal; in it a
+ * cell between four texel centres, by the mean luminance of its corners times its solid angle;
+ * then uniformly in solid angle within the cell. The density (per steradian) is exact, and positive
+ * wherever light reaches that side. A constant is sampled by the cosine. */
 #ifndef ASSAY_ENVIRONMENT_H
 #define ASSAY_ENVIRONMENT_H
 

@@ -7,8 +7,8 @@
 
 enum {
     PIXEL_FILTER_TEXT = 64,
-    /* Of the table: shares of one side from 2^-25 to 1/2 are cut into bins by their exponent and so
-     * many bits behind it. */
+    /* The table: shares of one side, 2^-25 to 1/2, binned by exponent and PIXEL_FILTER_BITS of
+     * mantissa. */
     PIXEL_FILTER_CUBIC = 4,
     PIXEL_FILTER_BITS = 4,
     PIXEL_FILTER_BINS = 24 << PIXEL_FILTER_BITS,
@@ -46,10 +46,10 @@ bool pixel_filter_is_gauss(const struct pixel_filter *f, double sigmas);
 
 /* f(x), per pixel. */
 double pixel_filter_value(const struct pixel_filter *f, double x);
-/* Where pixels share samples, each of which is counted by all filters that reach it: how many times
- * the sum of the pixels' variances (order 2), or third cumulants (3), the sum over a large square
- * of pixels has, if noise is as large between pixels as on them: with s(x) the sum of all pixels'
- * filters, (integral of f s^(order-1) / integral of f^order)^2. 2.25 and 4 for a tent of radius 1. */
+/* Where pixels share samples (each counts in all filters that reach it): variance (order 2) or third
+ * cumulant (3) of the sum over a large square of pixels, relative to the sum of the pixels' own, for
+ * noise of constant size. With s(x) the sum of all pixels' filters it is
+ * (integral of f s^(order-1) / integral of f^order)^2: 2.25 and 4 for a tent of radius 1. */
 double pixel_filter_sharing(const struct pixel_filter *f, int order);
 
 #endif

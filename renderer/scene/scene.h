@@ -160,7 +160,7 @@ struct scene {
     int32_t environment_light;       /* index into lights, -1 if there is none */
     char **documents;                /* paths of the other files that it was read from */
     uint32_t num_documents;
-    struct scene_camera camera;   /* the one to see by: the first, in the CGL dialect the last */
+    struct scene_camera camera;   /* the one in use: the first, in the CGL dialect the last */
     struct scene_camera *cameras; /* all */
     uint32_t num_cameras;
     vec3 bounds_min, bounds_max; /* of all primitives; 0 if there are none */
@@ -195,7 +195,7 @@ static inline bool material_has_map(const struct material *m)
  * primitives is fine. */
 NODISCARD bool scene_finish(struct scene *s, const char *where, struct err *e);
 
-/* Sees by the first camera of that name. False if there is none. */
+/* Uses the first camera of that name. False if there is none. */
 NODISCARD bool scene_choose_camera(struct scene *s, const char *name);
 
 /* Adds an environment, and its light behind all others, to a scene that is complete. The scene owns

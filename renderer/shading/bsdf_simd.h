@@ -148,7 +148,7 @@ INLINE rgbv eval_diffuse(rgbv reflectance)
     return rgb_scalev(reflectance, vf_set(INV_PI_F));
 }
 
-/* f of the lanes that scatter other than evenly alone, and the density of wi. diffuse: f of the part that does. */
+/* f, and the density of wi, of the lanes whose material is not diffuse alone. diffuse: f of a diffuse part. */
 INLINE rgbv eval_lobes(const struct materialv *m, vi lanes, rgbv diffuse, vec3v wo, vec3v wi,
                        vf *pdf_w)
 {
@@ -164,7 +164,7 @@ INLINE rgbv eval_lobes(const struct materialv *m, vi lanes, rgbv diffuse, vec3v 
     return rgb_select(plastic, rgb_addv(f, diffuse), f);
 }
 
-/* One of its lobes is picked by its share; both that are no mirror count in the weight, whichever it was. s holds a
+/* Picks one of its lobes by its share; the weight counts both lobes that are not the mirror. On entry s holds a
  * direction of the diffuse lobe. */
 INLINE void sample_plastic(const struct materialv *m, vi lanes, rgbv reflectance, vec3v wo,
                            const vf u[4], struct bsdf_samplev *s)
@@ -183,9 +183,9 @@ INLINE void sample_plastic(const struct materialv *m, vi lanes, rgbv reflectance
     sample_mirror(mirrored, wo, rgb_scalev(m->k, 1 / mirror), s);
 }
 
-/* Directions for the lanes of the mask; the others' are of no use. number, kinds and reflectance: of their materials;
- * front: a byte of 0 or 1 each, is wo on the side that the scene's geometric normal points to, in front of glass, not
- * inside it? u[0] and u[1] choose the direction, u[2] the part of the material. */
+/* Samples directions for the lanes of the mask; other lanes are undefined. number, kinds and reflectance: of their
+ * materials; front: 1 where wo is on the side of the scene's geometric normal (outside glass), else 0. u[0] and u[1]
+ * choose the direction, u[2] the lobe. */
 INLINE void sample_lobes(const float *record, const int32_t number[LANES], vi kinds,
                          rgbv reflectance, const bool *front, unsigned mask, vec3v wo,
                          const vf u[4], struct bsdf_samplev *s)

@@ -21,7 +21,7 @@ struct light_table; /* per-scene tables for choosing lights and triangles */
 NODISCARD struct light_table *light_table_build(const struct scene *s, struct err *e);
 void light_table_free(struct light_table *t);
 
-/* How many are no delta lights. */
+/* Area lights and environment. */
 uint32_t light_count_areas(const struct light_table *t);
 
 static inline bool light_is_delta(const struct light *l)

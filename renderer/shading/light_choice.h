@@ -1,5 +1,5 @@
-/* Many lights: chooses one by about what it sends to a place with a normal, as [Conty18], but of a
- * list of clusters in place of a tree. A cluster has a sphere around its lights and a cone around
+/* Many lights: chooses one by an estimate of what it sends to a place with a normal, as [Conty18],
+ * from a list of clusters, not a tree. A cluster has a sphere around its lights and a cone around
  * the directions in which they shine, and is taken in proportion to its weight: bounds on the
  * cosines at both ends times its value over the falloff to its centre. So lights behind a surface,
  * and lamps that turn their backs, are not taken, and all that can send some light are. Within a

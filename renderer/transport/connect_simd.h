@@ -9,10 +9,10 @@
 /* Samples of a light at a vertex whose rays go to the kernel together. */
 enum { TOGETHER = 4 };
 
-/* Vertices as samples of lights want them. */
+/* Vertices, as light sampling needs them. */
 struct vertexv {
     vec3v p, ng, ns, wo, off; /* off: where rays leave on the side of ng */
-    rgbv throughput, diffuse; /* diffuse: f of what is that of it */
+    rgbv throughput, diffuse; /* diffuse: f of the diffuse part */
     vf eps;
     vi bits;
 };
@@ -95,7 +95,7 @@ static __attribute__((noinline)) void sample_lamp_rows(struct batch *b, int firs
     }
 }
 
-/* In time: rays are stored no further back than in the row of their sample. */
+/* Not yet overwritten: rays are packed into rows up to this sample's. */
 INLINE void load_lamp_sample(const struct batch *b, int j, const struct lamp *lamp,
                              struct light_samplev *ls)
 {
@@ -107,7 +107,7 @@ INLINE void load_lamp_sample(const struct batch *b, int j, const struct lamp *la
     ls->delta = vi_set(0);
 }
 
-/* Of the lights in b->choice: of lamps together, else those of each light. */
+/* Samples the lights in b->choice: all lamps together, others one by one. */
 static __attribute__((noinline)) void sample_chosen(const struct integrator *it,
                                                     const struct batch *b, int k, unsigned mask,
                                                     int j, struct light_samplev *out)
@@ -128,7 +128,7 @@ static __attribute__((noinline)) void sample_chosen(const struct integrator *it,
     }
 }
 
-/* The like for other lights and one row; which lanes of the mask have a light to sample. */
+/* The same for other lights, one row; returns the lanes of the mask that have a sample. */
 INLINE unsigned sample_light(const struct integrator *it, const struct batch *b, int k,
                              const struct vertexv *v, unsigned mask,
                              const struct light_samples *what, int j, struct light_samplev *ls)
@@ -220,13 +220,13 @@ INLINE int connect_rows(const struct integrator *it, struct batch *b, int first,
     return rays;
 }
 
-/* What else is lit is found by other means. */
+/* Other emitters are found by other means. */
 INLINE bool samples_only_delta(const struct integrator *it)
 {
     return it->opt.direct != DIRECT_LIGHT && it->opt.direct != DIRECT_MIS;
 }
 
-/* Lanes that sample lights choose one by their fourth numbers, and leave there what is left of these. */
+/* Each lane that samples a light chooses it by its u[3], and stores the remainder of u[3] there. */
 static __attribute__((noinline)) void choose(const struct integrator *it, struct batch *b, int n)
 {
     const struct light_clusters *t = samples_only_delta(it) ? it->lights->delta : it->lights->all;

@@ -36,7 +36,7 @@ enum many_lights {
 enum roulette_kind {
     ROULETTE_OFF,
     ROULETTE_THROUGHPUT, /* from the third vertex on: survive with the largest component of the
-                            throughput, with nets four times that, 1 at most */
+                            throughput, with Sobol 4 times that, 1 at most */
     ROULETTE_FIXED       /* from the second vertex on: survive with the same probability each time,
                             as in the assignment */
 };
@@ -57,8 +57,8 @@ struct integrator_options {
         isa; /* of the stages; ISA_SCALAR: one path at a time. Every choice gives the same bits */
 };
 
-/* ROULETTE_THROUGHPUT: the chance to go on, over the largest component of the throughput. With nets a coin at every
- * vertex undoes what they gain: fewer coins are worth longer paths. */
+/* ROULETTE_THROUGHPUT: survival probability over the largest component of the throughput. With Sobol points, roulette at
+ * every vertex undoes their gain: less is worth longer paths. */
 static inline float roulette_factor(const struct integrator_options *o)
 {
     return o->sampler.kind == SAMPLER_INDEPENDENT ? 1 : 4;
@@ -90,7 +90,7 @@ struct batch {
     struct rgbs shadow_light; /* what the shadow ray brings if nothing is in between */
     bool occluded[BATCH_ROOM];
     struct vec3s p, ng, ns, wo; /* of the hit; normals turned to the side of wo */
-    /* Where the ray comes from: ns, if light was chosen by it there, and the weight of all of many lights. */
+    /* Where the ray starts: ns, if lights are chosen by it, and the total weight of the light clusters. */
     struct vec3s from_n;
     float from_weight[BATCH_ROOM];
     float eps[BATCH_ROOM];
@@ -102,10 +102,10 @@ struct batch {
     /* Paths that go on are kept side by side: whose path a lane is, and what it has gathered. */
     uint32_t slot[BATCH_ROOM], slot_pixel[BATCH_ROOM], slot_sample[BATCH_ROOM];
     float numbers
-        [4][BATCH_ROOM]; /* random ones, as many paths as there are lanes and one purpose a row */
+        [4][BATCH_ROOM]; /* random numbers; a row of LANES: these paths, one purpose */
     struct rgbs gathered, reflectance;
     int32_t bits[BATCH_ROOM]; /* of the material's record */
-    /* By as many paths as there are lanes, a bit each. */
+    /* One element per LANES paths, a bit for each. */
     uint16_t goes_on[BATCH_ROOM], shadow_bits[BATCH_ROOM], shadow_first[BATCH_ROOM];
     struct bvh_stats stats;
 };

@@ -22,7 +22,7 @@ INLINE void pick_rgb(struct rgbs *a, int i, rgbv c, vi order)
     rgb_store(a, i, (rgbv){pick(c.r, order), pick(c.g, order), pick(c.b, order)});
 }
 
-/* Which numbers of which vertices' purposes, the first of them each. */
+/* To draw: the first `used` numbers of `num` purposes of a vertex. */
 struct draws {
     int vertex;
     uint32_t purpose;
@@ -50,8 +50,8 @@ INLINE void draw_rows(struct batch *b, enum sampler_kind kind, uint64_t seed, in
     }
 }
 
-/* Numbers for the lanes first .. end, LANES after LANES, into rows of b->numbers. A loop of its own, short enough that
- * the machine works on several rounds of it at once; numbers of a Sobol sequence cost time one by one. */
+/* Draws numbers for the lanes first .. end, LANES at a time, into rows of b->numbers. A loop of its own, so short that
+ * the CPU overlaps several iterations. Every unused number of a Sobol point would cost time. */
 static __attribute__((noinline)) void draw_numbers(const struct integrator *it, struct batch *b,
                                                    int first, int end, struct draws what)
 {

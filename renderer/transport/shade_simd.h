@@ -13,7 +13,7 @@ struct surfacev {
     vi material, light;
 };
 
-/* surface_at() of hits from k; lanes that hit nothing get anything. */
+/* surface_at() of hits from k; undefined in lanes that hit nothing. */
 INLINE void surfaces(const struct integrator *it, const struct rays *r, const struct hits *h, int k,
                      struct surfacev *s)
 {
@@ -162,7 +162,7 @@ static void shade(const struct integrator *it, struct batch *b, int n, int verte
         if (lights_count) {
             unsigned lit = there & bits(vi_lt(vi_set(-1), s.light));
             if (lit) {
-                /* By way of a copy: what an address is taken of lives in memory for all its life. */
+                /* A copy: with its address taken, s would live in memory, not in registers. */
                 const struct surfacev met = s;
                 add_emission(it, b, k, lit, &met, vertex);
             }

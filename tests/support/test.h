@@ -51,7 +51,7 @@ void test_add_group(CMFixtureFunction set_up, CMFixtureFunction tear_down);
 /* "DIR/name" in a directory of this program's own, which is made when it is first asked for and removed with all that is
  * in it after the tests. One of 16 buffers, which take turns. */
 const char *test_path(const char *name);
-/* The whole file with a 0 behind it; the caller frees. Writes one of those bytes. */
+/* The whole file with a 0 behind it; the caller frees. And writes a file. */
 char *test_read(const char *path);
 void test_write(const char *path, const void *bytes, size_t size);
 /* Writes a text; one of JSON may have ' for ", which makes it legible in C. */

@@ -1,4 +1,4 @@
-/* Where the program's own files are: in the checkout that one stands in, else in that of the
+/* Where the program's own files are: in the cwd, if it is a checkout, else in that of the
  * program (build/assay), else where it is installed. */
 #ifndef ASSAY_DATA_DIRS_H
 #define ASSAY_DATA_DIRS_H
@@ -11,8 +11,8 @@ struct data_dirs {
     struct path pathtracer;               /* the program beside this one */
 };
 struct data_dirs data_dirs_find(void);
-/* The same, with suite_dir and, if that is a suite of the user's own (suite_own.h), with its golden/. NULL: the one in which one
- * stands, if it is such. */
+/* The same with suite_dir and, if that is a suite of the user's own (suite_own.h), its golden/. NULL: the current directory, if
+ * that is one. */
 struct data_dirs data_dirs_of_suite(const char *suite_dir);
 
 #endif

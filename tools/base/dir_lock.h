@@ -12,10 +12,10 @@ struct dir_lock {
     char path[4096];
 };
 
-/* Makes the directory and takes it. Refuses after two seconds, with a line that names its process and host, where another run has it. The lock
- * ends with the process, however that ends. Where nothing can be locked (some network file systems) it is taken all the
- * same. The caller calls dir_lock_release(), which removes a directory that was made here and has stayed empty; a lock that is
- * zero may be released, too. */
+/* Makes the directory and locks it. If another run holds the lock, fails after two seconds with a line that names that process and
+ * its host. The lock ends with the process, however that ends. Where the file system cannot lock (some network ones) it
+ * succeeds all the same. The caller calls dir_lock_release(), which removes a directory that was made here and is still empty;
+ * a zero lock may be released, too. */
 NODISCARD bool dir_lock_take(struct dir_lock *l, const char *dir, struct err *e);
 void dir_lock_release(struct dir_lock *l);
 

@@ -44,8 +44,8 @@ static bool join_names(const char *const *keep, char *out, size_t size, struct e
     return true;
 }
 
-/* What the supervisor says it was; without a word of it, the clock or the machine. What it says while it is killed with all around it is
- * no word: by then the program may have failed for want of its log. no_memory: the kernel has killed somebody. */
+/* How the run ended, by the supervisor's report; without one, by the clock. A report written while the whole run was being killed
+ * does not count: the program may have failed because its log was gone. no_memory: the kernel killed for memory. */
 static void read_report(const char *out, const struct sandbox_job *job, bool killed, bool no_memory,
                         const struct err *last, struct sandbox_result *r)
 {
@@ -154,7 +154,7 @@ static bool is_below(const char *path, const char *dir)
     return strncmp(path, dir, n) == 0 && (path[n] == '/' || path[n] == '\0');
 }
 
-/* Hides what lies below /usr, but not what programs and builds are made of; what is hidden with something else needs no place of its own. */
+/* Hides a path below /usr; fails for folders that programs and builds need. A path in a hidden folder takes no entry of its own. */
 static bool hide(struct sandbox *s, const char *path, struct err *e)
 {
     static const char *const parts[] = {"bin",  "include", "lib",     "lib32",     "lib64",

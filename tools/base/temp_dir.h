@@ -1,4 +1,4 @@
-/* A directory of a run's own below $TMPDIR, or /tmp, for what nobody is to see. */
+/* A private temporary directory of one run, below $TMPDIR or /tmp. */
 #ifndef ASSAY_TEMP_DIR_H
 #define ASSAY_TEMP_DIR_H
 
@@ -9,8 +9,8 @@ struct temp_dir {
     int lock; /* held for as long as it is in use [flock(2)] */
 };
 
-/* Makes $TMPDIR/assay-NAME-HOST.XXXXXX, mode 0700. Before that, those of the same name, host and user whose runs are over, which
- * a kill has left, are removed; what cannot be removed stays. The caller calls temp_dir_close(), before whom no other process of this kind touches it. */
+/* Makes $TMPDIR/assay-NAME-HOST.XXXXXX, mode 0700, and locks it. First removes those of the same name, host and user that killed
+ * runs have left, as far as possible. The caller calls temp_dir_close(); until then no other such process removes it. */
 NODISCARD bool temp_dir_open(struct temp_dir *d, const char *name, struct err *e);
 
 /* Removes it, with all that is in it; false with a line if that fails. Nothing where it is closed or was never opened (zero). */

@@ -25,7 +25,7 @@ struct channel_sweep {
     double squared; /* sum over pixels of d^2 - v: without bias for the sum of squared biases */
     /* Of luminance. */
     struct matched_filter directed;
-    double *root[2]; /* which that knows of the band; NULL */
+    double *root[2]; /* pyramid_build()'s root, or NULL */
 };
 
 /* A region, and what is around it: that of four times its side, or the image. */

@@ -77,9 +77,9 @@ int pyramid_tiles(int length, int tile);
 /* The levels of an image without their cells. tile >= 1; beyond the longer side it is that side. */
 struct pyramid pyramid_levels(int width, int height, int tile);
 
-/* Same sizes; in the memory of one that was built before, or is zero. root: of both sides' pixels, of luminance,
- * sum w_c cbrt k3_c, which is most of the work, where that is known; NULL: not. Fails only out of memory. Release with
- * pyramid_free(). */
+/* a and b have one size; *p is zero, or was built before and lends its memory. root: for both sides' pixels,
+ * sum w_c cbrt k3_c of luminance, which is most of the work, if known; else NULL. Fails only out of memory. Release
+ * with pyramid_free(). */
 NODISCARD bool pyramid_build(const struct moments *a, const struct moments *b, int channel,
                              double *const root[2], int tile, struct pyramid *p, struct err *e);
 void pyramid_free(struct pyramid *p);

@@ -45,10 +45,10 @@ struct measured {
 
 struct measured region_measure(const struct judge *j, const struct cell *cell, struct rect r);
 
-/* Whether region_is_normal(), or region_testable(), will be false because of the skewness alone:
- * most small regions fail there. False says nothing. */
+/* True: region_is_normal() will be false, for its skewness alone; most small regions fail there.
+ * False says nothing. */
 bool region_is_skewed(const struct judge *j, const struct cell *cell);
-/* The latter for a test by this statistic. */
+/* The same of region_testable(). */
 bool region_is_hopeless(const struct judge *j, const struct cell *cell, int statistic);
 /* The same as from region_measure() of one pixel: region_t() and the relative difference. */
 double region_pixel_t(const struct judge *j, const struct cell *cell, double *relative);

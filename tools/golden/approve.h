@@ -35,7 +35,8 @@ enum approval approve(const struct approve_options *opt, const struct suite_scen
                       const struct suite_reference *ref, FILE *out, struct err *e);
 
 void approve_compare_heading(FILE *out);
-/* Stores nothing: one line of a table with that heading: the versions of both, the difference, the verdict, which *verdict gets. False, with a line, if they cannot be compared. opt: from_dir, golden_dir, alpha. */
+/* Prints a line of that table (both versions, difference, verdict), sets *verdict, stores nothing. False, with a line, if they
+ * cannot be compared. opt: from_dir, golden_dir, alpha. */
 NODISCARD bool approve_compare(const struct approve_options *opt, const struct suite_scene *scene,
                                const struct suite_reference *ref, FILE *out, enum verdict *verdict,
                                struct err *e);

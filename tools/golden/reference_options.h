@@ -1,5 +1,5 @@
-/* The command `assay reference`: its words, what they ask for, and what becomes of one reference; for the verb and for who
- * plans it as jobs (job_reference.c). */
+/* The command `assay reference`: its arguments, what they select, the state of each reference; for the verb and for
+ * job_reference.c, which plans it as jobs. */
 #ifndef ASSAY_REFERENCE_OPTIONS_H
 #define ASSAY_REFERENCE_OPTIONS_H
 

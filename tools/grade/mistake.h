@@ -7,8 +7,8 @@
 #include "rubric_bugs.h"
 
 struct mistake {
-    bool judged;            /* points were lost: */
-    bool looked;            /* images were compared with the catalogue: */
+    bool judged;            /* points were lost */
+    bool looked;            /* images were compared with the catalogue */
     struct diagnosis found; /* named or not; never FINDING_CORRECT, as points were lost */
     int with;               /* the deviations on top of which */
     char why[200];          /* there is no diagnosis; "" */

@@ -27,7 +27,7 @@ struct grade_job {
 /* OUT/ID/grade.json, and a grade below: tools/docs/formats/grades.md. Texts of programs are in it: whoever shows them has to
  * escape them. */
 
-/* Grades all, `jobs` at a time. A submission that cannot be graded for our trouble has "trouble"; the others go
+/* Grades all, `jobs` at a time. A submission that we fail to grade has "trouble"; the others go
  * on. Fails only where nothing can be written. Two submissions of the same id are an error. *grades: a new array, in
  * the order of path. */
 NODISCARD bool grade_batch_run(const struct grade_job *job, json_t **grades, struct err *e);

@@ -41,9 +41,8 @@ void plan_free(struct plan *p);
 bool job_run_is_made(const struct plan *p, int k);
 NODISCARD bool job_run_verify(const struct plan *p, int k, struct err *e);
 
-/* Makes it, if it is not there with the right hash: *made. Fails if an input is not the one that
- * was planned with or the program fails; then there is no artefact. Current directory: the plan's
- * cwd. */
+/* Runs job k, unless its artefact is there with the right hash; *made: it ran. Fails if an input has
+ * changed or the program fails; then there is no artefact. Current directory: the plan's cwd. */
 NODISCARD bool job_run(const struct plan *p, int k, bool *made, struct err *e);
 
 /* Puts the artefacts together to what the command would have left, and returns its exit code. Fails

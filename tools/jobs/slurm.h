@@ -4,8 +4,8 @@
 
 #include "plan.h"
 
-/* Until every job of the plan is made: submits those that are not there and that no array in the queue will make, as an
- * array of at most 1000 tasks, and looks what becomes of them. Arrays that an earlier, interrupted run submitted are
+/* Until every job of the plan is made, submits those that are neither made nor in an array in the queue, as an array of at
+ * most 1000 tasks, and follows them. Arrays that an earlier, interrupted run submitted are
  * followed, not repeated. DIR/assay-PLAN-R: the jobs of round R, a line for each task; DIR/log/assay-PLAN-R-TASK.txt: what
  * it printed (PLAN: hash of plan.jsonl). One line of progress on stderr where anything changes.
  * Fails with a line if Slurm cannot be asked for a minute, or on a job that came back three times without its artefact. On SIGINT and

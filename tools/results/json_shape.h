@@ -21,7 +21,7 @@ enum shape_kind {
     NUM_SHAPE_KINDS
 };
 
-/* An object, or a list of so many of them or more. */
+/* An object, or a list of at least so many. */
 enum shape_part { PART_OBJECT = -1, PART_LIST = 0, PART_LIST_OF_1 = 1, PART_LIST_OF_2 = 2 };
 
 /* Names of each kind with a blank between: "name" has to be there, "name?" may be absent, "name~" may be null. And the parts of the
@@ -41,8 +41,8 @@ extern const char json_shape_measured[];
 /* The line of a failure begins with `where` and names the member, "rungs.spp" say. */
 NODISCARD bool json_shape_check(const json_t *object, const struct shape *shape, const char *where,
                                 struct err *e);
-/* A row has either an "error", and then is not "passed" and has no "verdict" but for want of time, or what is in `judged`, of which
- * "verdict" is one that "passed" agrees with. */
+/* A row has either an "error" (and then is not "passed", and has a "verdict" only if time was missing), or what is in `judged`,
+ * with a "verdict" that agrees with "passed". */
 NODISCARD bool json_shape_check_row(const json_t *row, const struct shape *judged,
                                     const char *where, struct err *e);
 

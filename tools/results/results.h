@@ -29,7 +29,7 @@ enum outcome { OUTCOME_NOT_JUDGED, OUTCOME_OPPOSITE, OUTCOME_UNDECIDED, OUTCOME_
 enum outcome results_claim_outcome(const json_t *claim);
 /* The same of a row that is no claim: stated errors, noise, an engine of the convergence. One that is only measured has passed. */
 enum outcome results_row_outcome(const json_t *row);
-/* How many claims have the error of claim i, which has one; 0 if an earlier one has it: it was said. */
+/* How many claims have the error of claim i, which has one; 0 if an earlier one has it. */
 size_t results_num_with_error(const json_t *claims, size_t i);
 /* Is no earlier claim (or row of noise) of its scene? */
 bool results_is_first_of_scene(const json_t *claims, size_t i);

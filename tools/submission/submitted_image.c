@@ -117,7 +117,7 @@ void submitted_image_free(struct submitted_image *s)
     *s = (struct submitted_image){0};
 }
 
-/* Runs of less than a third of the largest go. */
+/* Frees runs below a third of the largest. */
 static void drop_small(struct submitted_image *s)
 {
     static const double least = 1.0 / 3;

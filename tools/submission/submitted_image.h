@@ -37,7 +37,7 @@ NODISCARD bool submitted_image_read(const char *path, const char *curve, int wid
 void submitted_image_free(struct submitted_image *s);
 
 /* Adds a run and takes it over: s becomes the mean of its runs, weighted by their samples (spp of both is
- * set). A run with less than a third of the samples of the largest is kept but not part of the mean: it
+ * set). A run with less than a third of the samples of the largest is freed, not part of the mean: it
  * adds little, and its noise reaches the clipping point sooner. Fails, and leaves *more to the caller,
  * if memory is short. */
 NODISCARD bool submitted_image_add_run(struct submitted_image *s, struct submitted_image *more,

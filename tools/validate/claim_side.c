@@ -194,7 +194,7 @@ static bool render_engine(const struct validation *v, const struct side *s, int 
     return fs_make_parent_dirs(path.s, e) && json_write(path.s, out->manifest, e);
 }
 
-/* `more` becomes what was there before and it, or stays what was there where it has no image. The manifest is the first one's,
+/* `more` becomes the sum of `before` and itself, or a copy of `before` if it has no image. The manifest is that of `before`,
  * with all seeds. */
 static bool add_before(const struct side_image *before, struct side_image *more, struct err *e)
 {

@@ -21,7 +21,7 @@ enum {
     NOISE_TOP = 64                /* samples of the last rung of ours */
 };
 extern const int noise_ladder_spp[NOISE_RUNGS]; /* 1, 4, 16, 64 */
-/* Of the variance against a record that says that it can be had. */
+/* The least margin of a variance against its record. */
 extern const double noise_ladder_least_margin; /* 0.1 */
 
 struct noise_rung {
@@ -56,7 +56,7 @@ struct noise_job {
     uint32_t seed, first;    /* the seeds are replicate_seed(seed, first ...) */
     double timeout_s, deadline;
 };
-/* What a ladder is made of, which may grow. */
+/* The renders of a ladder; may grow. */
 struct noise_renders {
     int done;                   /* replicates */
     float *images[NOISE_RUNGS]; /* room for all of the job's */

@@ -92,7 +92,7 @@ static void collect(const struct validation *v, json_t *root)
     json_object_set_new(root, "seconds", json_real(progress_seconds() - v->start));
 }
 
-/* If it is time again. */
+/* Shows it if due. */
 static bool show_so_far(struct validation *v, const json_t *root, struct err *e)
 {
     if (!(v->opt->show_every_s > 0) || progress_seconds() < v->shown + v->opt->show_every_s)
@@ -262,7 +262,7 @@ static json_t *filter_sentence(const struct validation *v)
                         v->opt->engine->name, filter, left_out);
 }
 
-/* From whatever folder it was started. */
+/* Prints which folders are used. */
 static void tell_where(const struct validation *v)
 {
     const struct validate_options *o = v->opt;

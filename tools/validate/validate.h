@@ -63,7 +63,7 @@ struct validate_options {
 NODISCARD bool validate(const struct validate_options *opt, int argc, char **argv, json_t **results,
                         struct err *e);
 
-/* One of the parts that together judge what one run does, with the same bits: what of the scene to give as `only`. */
+/* A part of a run; all parts together give the same bits as the run. only: what to pass as validate_options.only. */
 struct validate_part {
     const struct suite_scene *scene;
     const char *const *only;

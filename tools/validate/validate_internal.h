@@ -12,8 +12,8 @@
 #include <pthread.h>
 
 enum { MAX_PATH = 8192, NUM_STAGES = 2, CLAIM_NAME = 256 };
-/* Of a scene: each reference against ours and the closed form and the further engine, that against ours, variants,
- * consistency, noise. */
+/* Of a scene: each reference with ours, the closed form and the further engine; that with ours; variants; consistency;
+ * noise. */
 enum { MAX_CLAIMS = 3 * MAX_REFERENCES + MAX_VARIANTS + 3 };
 
 enum side_kind {
@@ -127,8 +127,7 @@ void claim_run_name(const struct claim_run *t, char name[CLAIM_NAME]);
 /* Sides and tasks of all selected scenes and claims; scenes that the further engine cannot express are appended to
  * `cannot`. Fails on an unknown name, and where the engine can express none, unless this run is part of a larger one. */
 NODISCARD bool select_claims(struct validation *v, json_t *cannot, struct err *e);
-/* Whether t->next is a look at which anything is new; else moves on to the next that is, or to
- * NUM_LOOKS. */
+/* Moves t->next on to the first look, itself included, at which anything is new, or to NUM_LOOKS. */
 void claim_next_look(struct claim_run *t);
 /* Takes one look, of which t->result is set if it decides or was the last. */
 void claim_run_look(struct validation *v, struct claim_run *t);
