@@ -32,13 +32,8 @@ if [ $? = 0 ] && [ $seen = yes ] && ! grep -q 'The run goes on\|http-equiv="refr
     echo "ok page: it is there while the run goes on"; else
     echo "not ok page: it is there while the run goes on: seen $seen, $(ls "$tmp/going" | tr '\n' ' ')"; fi
 
-look page.mjs "$tmp/report/index.html" "$tmp/report/results.json" "$build/browser/shots" "$tmp/going.html" "$tmp/going/index.html"
-
-# Control: with two images exchanged nothing but the values is wrong, and that is found.
 sed 's/id="layer-0"/id="layer-x"/; s/id="layer-1"/id="layer-0"/; s/id="layer-x"/id="layer-1"/' "$tmp/report/index.html" >"$tmp/exchanged.html"
-if node "$here/page.mjs" "$build/browser" "$tmp/exchanged.html" "$tmp/report/results.json" "$tmp" --values-only 2>&1 |
-    grep -q '^not ok page: values, errors'; then echo "ok page: exchanged images are found"; else
-    echo "not ok page: exchanged images are found: no"; fi
+look page.mjs "$tmp/report/index.html" "$tmp/report/results.json" "$build/browser/shots" "$tmp/going.html" "$tmp/going/index.html" "$tmp/exchanged.html"
 
 # File names as an attacker would choose them, and all the texts of results.json too.
 evil='<img src=x onerror=alert(1)>'

@@ -11,9 +11,8 @@ const SCALE = 2 ** 30;
 export function readExr(path) {
   const directory = mkdtempSync(join(tmpdir(), "exr-")), scaled = join(directory, "scaled.exr");
   const run = (...args) => execFileSync("oiiotool", args, { encoding: "utf8", maxBuffer: 1 << 28 });
-  const info = run("--info", "-v", path), [, width, height] = /:\s+(\d+) x\s+(\d+),/.exec(info).map(Number);
+  const info = run("--info", "-v", path, "--mulc", String(SCALE), "-o", scaled), [, width, height] = /:\s+(\d+) x\s+(\d+),/.exec(info).map(Number);
   const names = /channel list: (.*)/.exec(info)[1].split(",").map((n) => n.trim().split(" ")[0]);
-  run(path, "--mulc", String(SCALE), "-o", scaled);
   const pixels = new Map();
   for (const m of run("--dumpdata", scaled).matchAll(/Pixel \((\d+), (\d+)\):([^\n]*)/g))
     pixels.set(m[1] + "," + m[2], m[3].trim().split(/\s+/).map((v) => +v / SCALE));

@@ -16,28 +16,33 @@ function check(name, good, why = "") {
 
 const browser = await chromium.launch({ executablePath: "/usr/bin/chromium", args: ["--no-sandbox"] });
 const complaints = [], requests = [];
-async function open(path, width, colorScheme) {
+async function tab(width, colorScheme) {
   // axe runs in the page, whose policy lets no script in.
   const context = await browser.newContext({ viewport: { width, height: 844 }, colorScheme, bypassCSP: true });
   const page = await context.newPage();
-  page.on("console", (m) => ["error", "warning"].includes(m.type()) && complaints.push(path + ": " + m.text()));
-  page.on("pageerror", (e) => complaints.push(path + ": " + e.message));
-  page.on("dialog", (d) => { complaints.push(path + ": dialog " + d.message()); d.dismiss(); });
+  page.on("console", (m) => ["error", "warning"].includes(m.type()) && complaints.push(page.url() + ": " + m.text()));
+  page.on("pageerror", (e) => complaints.push(page.url() + ": " + e.message));
+  page.on("dialog", (d) => { complaints.push(page.url() + ": dialog " + d.message()); d.dismiss(); });
   page.on("request", (r) => requests.push(r.url()));
+  return page;
+}
+async function open(path, width, colorScheme) {
+  const page = await tab(width, colorScheme);
   await page.goto("file://" + resolve(grades, path));
   return page;
 }
 
 const wide = [], found = [], dead = [], grounds = new Set();
-for (const path of ["index.html", ...all.flatMap((g) => [g.id + "/index.html", g.id + "/staff.html"])])
-  for (const [width, scheme] of [[1280, "light"], [390, "dark"]]) {
-    const page = await open(path, width, scheme);
+for (const [width, scheme] of [[1280, "light"], [390, "dark"]]) {
+  const page = await tab(width, scheme); // one for all, since each takes a process of its own
+  for (const path of ["index.html", ...all.flatMap((g) => [g.id + "/index.html", g.id + "/staff.html"])]) {
+    await page.goto("file://" + resolve(grades, path));
     await page.evaluate(`document.querySelectorAll("details").forEach((d) => (d.open = true))`);
     const over = await page.evaluate("document.scrollingElement.scrollWidth - window.innerWidth");
     if (over > 0) wide.push(path + " at " + width + ": " + over + " px");
     grounds.add(scheme + await page.evaluate("getComputedStyle(document.body).backgroundColor"));
     await page.evaluate(axe);
-    const { violations } = await page.evaluate("axe.run()");
+    const { violations } = await page.evaluate('axe.run({ resultTypes: ["violations"] })');
     for (const v of violations) found.push(path + " " + width + " " + scheme + ": " + v.id + " " + v.nodes[0].html.slice(0, 120));
     for (const href of await page.locator("a").evaluateAll((links) => links.map((a) => a.getAttribute("href")))) {
       const there = href.startsWith("#") ? await page.evaluate(`document.getElementById(${JSON.stringify(href.slice(1))}) !== null`)
@@ -45,8 +50,9 @@ for (const path of ["index.html", ...all.flatMap((g) => [g.id + "/index.html", g
       if (!there) dead.push(path + ": " + href);
     }
     await page.screenshot({ path: shots + "/grades-" + path.replace(/[^a-z0-9]+/gi, "-") + "-" + width + "-" + scheme + ".png", fullPage: true });
-    await page.context().close();
   }
+  await page.context().close();
+}
 check("nothing sticks out", wide.length === 0, wide.join("; "));
 check("axe finds nothing", found.length === 0, found.join("; "));
 check("links lead somewhere", dead.length === 0, dead.join("; "));
@@ -54,7 +60,7 @@ check("light and dark are two", grounds.size === 2, [...grounds].join());
 const bad = await open("index.html", 1280, "light");
 await bad.evaluate(axe);
 await bad.evaluate(`document.querySelector("th").style.color = "#eee"`);
-check("axe finds what is pale (control)", (await bad.evaluate("axe.run()")).violations.some((v) => v.id === "color-contrast"));
+check("axe finds what is pale (control)", (await bad.evaluate('axe.run({ resultTypes: ["violations"] })')).violations.some((v) => v.id === "color-contrast"));
 await bad.context().close();
 
 // Who needs staff comes first and is named on top; of each what is wrong with it.

@@ -1,12 +1,12 @@
-// node page.mjs MODULES PAGE RESULTS SHOTS GOING SUITE|--values-only: the page of one scene of four images, in Debian's chromium,
-// GOING, one of a run that has not ended, and SUITE, one of three scenes.
+// node page.mjs MODULES PAGE RESULTS SHOTS GOING SUITE EXCHANGED: the page of one scene of four images, in Debian's chromium,
+// GOING, one of a run that has not ended, SUITE, one of three scenes, and EXCHANGED, PAGE with its first two images exchanged.
 // Prints "ok NAME" or "not ok NAME: why". What it must show comes from the EXR files.
 import { createRequire } from "node:module";
 import { readFileSync, writeFileSync } from "node:fs";
 import { dirname, resolve } from "node:path";
 import { readExr, pixelOf, grey, srgb } from "./files.mjs";
 
-const [modules, pagePath, resultsPath, shots, goingPath, suitePath] = process.argv.slice(2);
+const [modules, pagePath, resultsPath, shots, goingPath, suitePath, exchangedPath] = process.argv.slice(2);
 const require = createRequire(resolve(modules) + "/");
 const { chromium } = require("playwright-core");
 const axe = readFileSync(require.resolve("axe-core/axe.min.js"), "utf8");
@@ -46,7 +46,7 @@ check("keys 1 to 4 are ours, Cycles, POV-Ray, truth", names.slice(0, 4).join() =
 
 // The table of the pixel under the pointer against the files: every number is right to its last digit but one
 // unit, which is how exact the page says it is (1/16 of the error, two digits of which are shown).
-const rows = () => page.evaluate(`[...document.querySelectorAll(".probe tbody tr")].map((r) => [...r.cells].map((c) => c.textContent))`);
+const rows = (page) => page.evaluate(`[...document.querySelectorAll(".probe tbody tr")].map((r) => [...r.cells].map((c) => c.textContent))`);
 const number = (text) => +text.replace(/\u2212/g, "-").replace("%", "");
 function agrees(text, value, error, unitOfError = 1) {
   const [v, e] = text.split("\u00b1").map(number);
@@ -55,36 +55,38 @@ function agrees(text, value, error, unitOfError = 1) {
 }
 const map = (name) => claims.map((c) => readExr(directory + c.files[name]));
 const zMaps = map("z"), relativeMaps = map("relative");
-let wrong = [];
-for (const [x, y] of [[0, 0], [size.width - 1, size.height - 1], [20, 33], [40, 9], [size.width >> 1, 1]]) {
-  await page.evaluate(`scenes[0].show(1, null)`);
-  await frames(page);
-  const frame = page.locator(".stage .frame"), pixel = (await frame.boundingBox()).width / size.width;
-  await frame.hover({ position: { x: (x + 0.5) * pixel, y: (y + 0.5) * pixel } });
-  await frames(page);
-  const table = await rows();
-  for (const row of table.filter((r) => r.length === 5)) {
-    const p = pixelOf(images[row[0]], x, y), exact = results.claims.some((c) => c.b === row[0] && c.unit_b === "exact");
-    for (let k = 0; k < 3; k++)
-      if (!agrees(row[k + 1], p.value[k], exact ? 0 : p.error[k])) wrong.push(row[0] + " " + x + "," + y + ": " + row[k + 1] + " is " + p.value[k] + " ± " + p.error[k]);
-    if (row[4] !== "exact" && number(row[4]) !== p.n) wrong.push(row[0] + ": n " + row[4] + " is " + p.n);
+async function valuesWrong(page) {
+  const wrong = [];
+  for (const [x, y] of [[0, 0], [size.width - 1, size.height - 1], [20, 33], [40, 9], [size.width >> 1, 1]]) {
+    await page.evaluate(`scenes[0].show(1, null)`);
+    await frames(page);
+    const frame = page.locator(".stage .frame"), pixel = (await frame.boundingBox()).width / size.width;
+    await frame.hover({ position: { x: (x + 0.5) * pixel, y: (y + 0.5) * pixel } });
+    await frames(page);
+    const table = await rows(page);
+    for (const row of table.filter((r) => r.length === 5)) {
+      const p = pixelOf(images[row[0]], x, y), exact = results.claims.some((c) => c.b === row[0] && c.unit_b === "exact");
+      for (let k = 0; k < 3; k++)
+        if (!agrees(row[k + 1], p.value[k], exact ? 0 : p.error[k])) wrong.push(row[0] + " " + x + "," + y + ": " + row[k + 1] + " is " + p.value[k] + " ± " + p.error[k]);
+      if (row[4] !== "exact" && number(row[4]) !== p.n) wrong.push(row[0] + ": n " + row[4] + " is " + p.n);
+    }
+    table.filter((r) => r.length === 3).forEach((row, i) => {
+      const [d] = row[1].split("\u00b1").map(number), z = zMaps[i].at("z", x, y), relative = relativeMaps[i].at("rel", x, y);
+      const a = pixelOf(images[claims[i].a], x, y), b = pixelOf(images[claims[i].b], x, y);
+      const unit = (grey(a.value) - grey(b.value)) / relative, noise = Math.hypot(grey(a.error), grey(b.error)) / unit;
+      // Both sides are off by 1/16 of their error or 2^-20 of themselves.
+      const off = 0.2 * noise + 2 * 2 ** -20 * grey(b.value) / unit + 5e-4 * Math.abs(relative);
+      if (Number.isFinite(unit) && Math.abs(d / 100 - relative) > off) wrong.push(row[0] + ": difference " + row[1] + " is " + 100 * relative);
+      if (noise > 1e-3 && Math.abs(number(row[2]) - z) > off / noise + 0.01) wrong.push(row[0] + ": t " + row[2] + " is " + z);
+    });
   }
-  table.filter((r) => r.length === 3).forEach((row, i) => {
-    const [d] = row[1].split("\u00b1").map(number), z = zMaps[i].at("z", x, y), relative = relativeMaps[i].at("rel", x, y);
-    const a = pixelOf(images[claims[i].a], x, y), b = pixelOf(images[claims[i].b], x, y);
-    const unit = (grey(a.value) - grey(b.value)) / relative, noise = Math.hypot(grey(a.error), grey(b.error)) / unit;
-    // Both sides are off by 1/16 of their error or 2^-20 of themselves.
-    const off = 0.2 * noise + 2 * 2 ** -20 * grey(b.value) / unit + 5e-4 * Math.abs(relative);
-    if (Number.isFinite(unit) && Math.abs(d / 100 - relative) > off) wrong.push(row[0] + ": difference " + row[1] + " is " + 100 * relative);
-    if (noise > 1e-3 && Math.abs(number(row[2]) - z) > off / noise + 0.01) wrong.push(row[0] + ": t " + row[2] + " is " + z);
-  });
+  return wrong.slice(0, 5).join("; ");
 }
-check("values, errors, n, differences and t are those of the files", wrong.length === 0, wrong.slice(0, 5).join("; "));
-
-if (process.argv.includes("--values-only")) {
-  await browser.close();
-  process.exit();
-}
+const wrong = await valuesWrong(page);
+check("values, errors, n, differences and t are those of the files", wrong === "", wrong);
+const exchanged = await open(exchangedPath, 1280, 900);
+check("control: exchanged images are found", await valuesWrong(exchanged) !== "");
+await exchanged.context().close();
 
 // What is painted: the buffer that the stage shows (its second image, if over), pixel by pixel.
 const painted = (over, x, y) => page.evaluate(([o, px, py]) => {
@@ -368,7 +370,7 @@ for (const [path, scheme] of [[pagePath, "light"], [suitePath, "dark"]]) {
   const looked = await open(path, 1280, 900, { bypassCSP: true, colorScheme: scheme });
   await looked.evaluate(`document.querySelectorAll("details").forEach((d) => (d.open = true))`);
   await looked.evaluate(axe);
-  const { violations } = await looked.evaluate("axe.run()");
+  const { violations } = await looked.evaluate('axe.run({ resultTypes: ["violations"] })');
   check("axe finds nothing, " + scheme, violations.length === 0, violations.map((v) => v.id + " " + v.nodes[0].html.slice(0, 120)).join("; "));
   await looked.context().close();
 }
