@@ -1,7 +1,7 @@
 # Assay. `make validate` and `make check` are the two commands; `make help` lists the rest.
 # Everything is built below $(BUILD); only `make golden` and the studies write beside the sources.
-# This file builds the programs and runs the suite; tools/packaging/packaging.mk installs and packs them, tests/tests.mk and the
-# files that it includes test, measure and look at them. Lines that begin with "#: " are `make help`.
+# This file builds the programs and runs the suite; tools/packaging/packaging.mk installs and packs them, tests/tests.mk
+# and the files that it includes test, measure and lint them. Lines that begin with "#: " are `make help`.
 
 BUILD  ?= build
 LIVE   ?=
@@ -32,8 +32,9 @@ cflags    = -std=c17 $(OPT) -ffp-contract=off $(WARN_C) -D_XOPEN_SOURCE=700 -pth
 # OpenImageIO is in oiio.so alone (renderer/image/image_oiio.h).
 cxxflags  = -std=c++17 -fPIC $(OPT) $(WARN) $(CXXFLAGS) -I. $(shell pkg-config --cflags OpenImageIO | sed 's/-I/-isystem /g')
 
-# Compiled once for each instruction set (renderer/base/isa.h), renderer/bvh/traverse_avx2.c.o say. ONE_LANE: for one lane, too;
-# SIXTEEN: with sixteen lanes where there are such instructions, the others have eight children, triangles or bounds in theirs.
+# Kernels, compiled once for each instruction set (renderer/base/isa.h), e.g. as renderer/bvh/traverse_avx2.c.o.
+# ONE_LANE: also for one lane; SIXTEEN: with sixteen lanes under AVX-512, while the others have eight (of children,
+# triangles or bounds) in any set.
 ISAS     := sse42 avx2 avx512
 BY_ISA   := $(addprefix renderer/,bvh/traverse bvh/small_scene_trace bvh/sah_split transport/integrator_simd)
 ONE_LANE := renderer/transport/integrator_simd
@@ -107,7 +108,7 @@ endef
 isa_sse42  := -msse4.2
 isa_avx2   := -mavx2 -mfma -mbmi -mbmi2 -mpopcnt -mlzcnt
 isa_avx512 := $(isa_avx2) -mavx512f -mavx512vl -mavx512bw -mavx512dq
-# -Wno-psabi: no vector of 32 or 64 bytes leaves the file.
+# -Wno-psabi: no vector of 32 or 64 bytes is passed between files.
 isa_lanes   = $(if $(and $(filter avx512,$(1)),$(filter $(SIXTEEN),$(2))),16,8)
 isa_flags   = -DISA=$(1) $(if $(isa_$(1)),-DLANES=$(isa_lanes)) $(isa_$(1)) -Wno-psabi
 define kernel_object
@@ -116,8 +117,8 @@ $(1)/$(2)_$(3).c.o: $(2).c | $(4)
 	$$(compile_c)
 endef
 
-# Everything below one directory, with the compiler and the flags that are set for it: $(call tree,DIRECTORY,PACKAGES,KERNELS),
-# KERNELS: where its kernels come from, if not from there.
+# A whole build below DIRECTORY, with the compiler and flags that are set for it: $(call
+# tree,DIRECTORY,PACKAGES,KERNELS), KERNELS: the directory of the kernels' objects, if another.
 define tree
 $(1)/%.c.o: %.c | $(2)
 	$$(compile_c)
@@ -145,9 +146,9 @@ $(BUILD)/commit: FORCE
 	$(Q)mkdir -p $(@D) && echo $(VERSION) $(COMMIT) | cmp -s - $@ || echo $(VERSION) $(COMMIT) > $@
 FORCE:
 
-# Asks dpkg what is missing and apt for just that, as root or through sudo. Where there is no dpkg the
-# packages are taken to be there, under whatever names. Who else installs something meanwhile is waited for, ten minutes: apt's own
-# DPkg::Lock::Timeout knows nothing of the lock of its lists.
+# Asks dpkg what is missing and apt for just that, as root or through sudo. Without dpkg the packages are taken to be
+# installed, under whatever names. Waits up to ten minutes for other installations: apt's own DPkg::Lock::Timeout does
+# not cover the lock of its lists.
 define install_missing
 	$(Q)mkdir -p $(@D); \
 	if command -v dpkg-query >/dev/null; then \
@@ -177,13 +178,13 @@ $(BUILD)/deps-live: | $(BUILD)/deps
 	$(call install_missing,$(DEPS_LIVE))
 
 include tools/packaging/packaging.mk
-# Not there where a grader of submissions builds the programs (tools/autograder/pack.sh).
+# Missing in the autograder's zip (tools/autograder/pack.sh), which has no tests.
 -include tests/tests.mk
 
 .PHONY: all validate golden results report deps deps-live format clean help FORCE
 .SECONDARY:
 .DELETE_ON_ERROR:
-# What only prints does without: it takes a second to read them.
+# The print-* targets do without dependency files, which take a second to read.
 ifneq ($(filter-out print-%,$(or $(MAKECMDGOALS),all)),)
 -include $(shell find $(BUILD) -name '*.d' 2>/dev/null)
 endif

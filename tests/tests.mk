@@ -1,10 +1,11 @@
-# The tests: `make check` and what it runs, in other builds too. lint/lint.mk, mutants/mutants.mk and studies/studies.mk have the rest.
+# The tests: `make check` and what it runs, also in other builds. The rest is in lint/lint.mk, mutants/mutants.mk,
+# studies/studies.mk.
 
 SECONDS_EACH ?= 60
 DEPS_TEST := libcmocka-dev zip ccache clang libclang-rt-dev libxml2-utils libembree-dev patch cmake openimageio-tools chromium \
   $(DEPS_DEB) locales python3-numpy python3-jsonschema python3-pytest python3-venv python3-pip python3-setuptools python3-wheel \
   $(if $(shell command -v npm),,nodejs npm)
-# Version 4 where it is there, as embree_mesh.h; asked when it has been installed.
+# Embree 4 if installed, else 3, as in embree_mesh.h; expanded late, when it has been installed.
 LIB_EMBREE = -lembree$(if $(wildcard /usr/include/embree4/rtcore.h),4,3)
 DEPS_LINT := clang-tidy cppcheck llvm
 $(BUILD)/deps-test: | $(BUILD)/deps
@@ -18,11 +19,12 @@ TESTS    := $(wildcard tests/*/test_*.c tests/*/*/test_*.c)
 PROGRAMS := $(wildcard tests/*/make_*.c tests/*/*/make_*.c) tests/mutants/diagnose_rates.c tests/mutants/machine/image_change.c \
   tests/end_to_end/student_tracer.c tests/studies/bench/bench.c
 BENCH   := $(wildcard tests/studies/bench/bench*.c) tests/studies/bench/embree_tracer.c
-# What several tests share: a library, of which each takes what it wants.
+# What several tests share, as a library from which each links what it needs.
 SUPPORT := $(filter-out $(TESTS) $(PROGRAMS) $(BENCH) tests/support/asan_options.c, \
   $(wildcard tests/support/*.c tests/renderer/*/*.c tests/reference/*/*.c tests/tools/*/*.c tests/studies/*/*.c tests/mutants/bug_effect.c))
-# Without sanitizers, which the same code meets in the others: simulations of thousands of claims, and closed forms and other
-# programs against millions of rays and samples (test_widths has every material, light and option, test_bvh_wide all of the tracing).
+# Run without sanitizers: simulations of thousands of claims, and closed forms and other programs against millions of
+# rays and samples. Other tests run the same code with them (test_widths every material, light and option, test_bvh_wide
+# all of the tracing).
 RATES   := $(addprefix test_,alpha_spending calibration compare_rates converge diagnose noise_estimate permutation sign_flip statistics)
 TRUTHS  := $(addprefix test_,embree independence integrator lights materials metamorphic povray_optics suite_scenes truth_lens \
   truth_mirrors_and_glass)
@@ -30,12 +32,12 @@ PLAIN   := $(RATES) $(TRUTHS)
 program  = $(addprefix $(1)/tests/,$(basename $(notdir $(2))))
 CHECKED  = $(filter-out $(addprefix %/,$(PLAIN)),$(call program,$(BUILD)/san,$(TESTS))) $(PLAIN:%=$(BUILD)/tests/%)
 
-# -g1: file and line are all that a finding says, and -g doubles the time that the kernels take to compile.
+# -g1: a finding needs no more than file and line, and -g doubles the compile time of the kernels.
 SANITIZE := -O1 -g1 -fno-omit-frame-pointer -fno-sanitize-recover=all -fsanitize=address,undefined
-# The same under sanitizers; all of it by clang, to see that it has no warning there too, and for the fuzzers; on demand
-# under ThreadSanitizer, and with clang's counts of what ran.
+# Builds: san with ASan and UBSan; clang for its warnings and for the fuzzers; on demand tsan with ThreadSanitizer and
+# cov with clang's coverage counters.
 $(BUILD)/san/%: OPT := $(SANITIZE)
-# Where tests spend most of their time it pays to compile longer.
+# Files in which tests spend most of their time are worth more optimisation.
 BUSY := renderer/bvh/bvh tools/compare/hint tools/diagnose/bug_fit tools/diagnose/signature tools/exact/permutation tools/grade/difference tools/images/flip
 $(BUSY:%=$(BUILD)/san/%.c.o): OPT = $(SANITIZE:-O1=-O2)
 $(BUILD)/san/%: WERROR := 1
@@ -47,16 +49,17 @@ $(BUILD)/clang/%: WERROR := 1
 $(BUILD)/tsan/%: OPT := -O1 -g -fno-omit-frame-pointer -fsanitize=thread
 $(BUILD)/cov/%: CC := clang
 $(BUILD)/cov/%: CXX := clang++
-# Without -g, of which clang 14 dies in sixteen lanes.
+# Without -g, on which clang 14 crashes in the kernels of sixteen lanes.
 $(BUILD)/cov/%: OPT := -O2 -fprofile-instr-generate -fcoverage-mapping
 $(BUILD)/cov/%: WERROR := 1
-# What no fuzzer runs is compiled in a fifth of the time; one that ran it after all would end (tests/fuzz/fuzz.c).
+# Code that no fuzzer runs is compiled without sanitizers, in a fifth of the time; a fuzzer that ran it would abort
+# (tests/fuzz/fuzz.c).
 UNFUZZED := $(addprefix renderer/,bvh shading transport pathtracer) reference/truth \
   $(patsubst %/,%,$(sort $(dir $(wildcard reference/*/export_*.h)))) \
   $(addprefix tools/,stats compare sequential plots report validate converge commands)
 $(foreach d,$(UNFUZZED),$(eval $(BUILD)/clang/$(d)/%: OPT := -O0 -finstrument-functions))
 $(foreach b,san tsan cov,$(eval $(call tree,$(BUILD)/$(b),$(BUILD)/deps-test)))
-# Of the kernels clang looks at the syntax alone, in a twentieth of the time; the fuzzers are linked with those of the programs.
+# Clang only checks the syntax of the kernels, in a twentieth of the time; the fuzzers are linked with gcc's kernels.
 $(eval $(call tree,$(BUILD)/clang,$(BUILD)/deps-test,$(BUILD)))
 
 define test_program
@@ -69,7 +72,7 @@ $(foreach t,$(TESTS) $(PROGRAMS),$(eval $(call test_program,$(1),$(t))))
 $(call program,$(1),$(TESTS) $(PROGRAMS)): $(1)/tests/support/asan_options.c.o $(1)/libtests.a $(1)/libassay.a | $(1)/oiio.so
 	$$(link)
 $(1)/tests/%: TEST_LIBS := -lcmocka
-# Whole programs with a malloc() of their own, which can fail.
+# The programs with a malloc() of their own that can be made to fail.
 $(1)/no_memory/pathtracer: $(1)/renderer/pathtracer/pathtracer.c.o
 $(1)/no_memory/assay: $(1)/tools/commands/assay.c.o
 $(1)/no_memory/pathtracer $(1)/no_memory/assay: $(1)/tests/end_to_end/no_memory.c.o $(1)/tests/support/asan_options.c.o $(1)/libassay.a | $(1)/oiio.so
@@ -81,9 +84,9 @@ $(foreach b,$(BUILD) $(BUILD)/san $(BUILD)/tsan $(BUILD)/cov,$(eval $(call test_
 $(BUILD)/san/pathtracer $(BUILD)/san/assay: $(BUILD)/san/tests/support/asan_options.c.o
 $(call obj,$(BUILD),$(TESTS) $(PROGRAMS) $(BENCH) $(SUPPORT) tests/support/asan_options.c tests/end_to_end/no_memory.c): | $(BUILD)/deps-test
 $(BUILD)/tests/bench: $(call obj,$(BUILD),$(BENCH))
-# The peer gets all that this machine has; ours chooses when it starts.
+# The peer is compiled for this machine's instructions; our renderer chooses its own at start.
 $(BUILD)/tests/studies/bench/embree_tracer.c.o: CFLAGS += -march=native -ffast-math -ffp-contract=fast
-# playwright-core, by which the page is tested in Debian's chromium; without it the tests say that they are skipped.
+# playwright-core, with which pages are tested in Debian's chromium; without it those tests are skipped, and say so.
 $(BUILD)/browser/package-lock.json: tests/browser/package-lock.json tests/browser/package.json | $(BUILD)/deps-test
 	$(call say,NPM,$@)
 	$(Q)mkdir -p $(@D) && cp tests/browser/package.json $(@D) && cp $< $(@D)/lock.json && cd $(@D) && \
@@ -97,7 +100,7 @@ check: $(BUILD)/deps-test $(BUILD)/deps-lint all programs-san programs-clang pro
 
 programs-no-memory: $(BUILD)/san/no_memory/pathtracer $(BUILD)/san/no_memory/assay $(BUILD)/no_memory/pathtracer
 programs-san: $(BUILD)/san/pathtracer $(BUILD)/san/assay $(BUILD)/san/oiio.so
-# What the fuzzers are linked from, and all the rest as far as clang's warnings look.
+# The library that the fuzzers are linked with, and all other sources for clang's warnings alone.
 programs-clang: $(BUILD)/clang/libassay.a $(patsubst %,$(BUILD)/clang/%.ok,$(KERNELS) $(MAINS) $(filter-out tests/fuzz/% tests/lint/%,$(wildcard tests/*/*.c tests/*/*/*.c)))
 define clang_ok
 	$(call say,CC,$@)
@@ -112,7 +115,7 @@ $(BUILD)/clang/$(1)_$(2).c.ok: $(1).c | $(BUILD)/deps-test
 endef
 $(foreach k,$(BY_ISA),$(foreach i,$(call isas_of,$(k)),$(eval $(call kernel_ok,$(k),$(i)))))
 
-# Readers of files under libFuzzer: one program for each tests/fuzz/fuzz_NAME.c.
+# Readers of files under libFuzzer, one program for each tests/fuzz/fuzz_NAME.c.
 FUZZ := $(patsubst tests/fuzz/fuzz_%.c,%,$(wildcard tests/fuzz/fuzz_*.c))
 $(BUILD)/clang/fuzz_%: TEST_LIBS := -fsanitize=fuzzer
 $(patsubst %,$(BUILD)/clang/fuzz_%,$(FUZZ)): $(BUILD)/clang/fuzz_%: $(BUILD)/clang/tests/fuzz/fuzz_%.c.o \

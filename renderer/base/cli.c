@@ -24,8 +24,8 @@ static int find_short(const struct cli_option *options, char name)
     return CLI_ERROR;
 }
 
-/* Damerau-Levenshtein distance of two words of at most 31 letters [Damerau64]: letters to change,
- * insert, delete or exchange with their neighbour. MOST for longer words. */
+/* Edit distance of two words of at most 31 letters [Damerau64], in the variant that edits no letter
+ * twice: letters to change, insert or delete, and neighbours to swap. MOST for longer words. */
 static int distance(const char *a, size_t n, const char *b)
 {
     enum { MOST = 32 };
@@ -89,7 +89,7 @@ static int num_args(const struct cli_option *o)
     return num;
 }
 
-/* "480x360" for an option of W H. */
+/* Takes `word` as both arguments of an option with W H if it reads like "480x360". */
 static bool take_size(struct cli *c, const struct cli_option *o, const char *word)
 {
     size_t w = strspn(word, "0123456789");
@@ -103,7 +103,7 @@ static bool take_size(struct cli *c, const struct cli_option *o, const char *wor
     return true;
 }
 
-/* The option's arguments are the words that follow. */
+/* Takes option i's arguments from the words that follow. Returns i or CLI_ERROR. */
 static int take_words(struct cli *c, int i, const char *arg, struct err *e)
 {
     const struct cli_option *o = &c->options[i];
@@ -139,7 +139,7 @@ static int next_long(struct cli *c, const char *arg, struct err *e)
     return i;
 }
 
-/* at: the letter in arg to be read next. Behind it may stand more flags (-qv) or the option's
+/* at: the next letter of arg to read. It may be followed by more flags (-qv) or by the option's
  * argument (-j4). */
 static int next_short(struct cli *c, const char *arg, const char *at, struct err *e)
 {
@@ -338,7 +338,7 @@ static bool read_range(const struct cli_option *o, const char *what, const char 
            (out[0] < out[1] || err_set(e, "%s: no %s in '%s'", what, o->noun, text));
 }
 
-/* One argument of an option. */
+/* Parses one argument of option o into *to. */
 static bool read_value(const struct cli_option *o, const char *text, void *to, struct err *e)
 {
     char what[64];
@@ -365,7 +365,7 @@ static bool read_value(const struct cli_option *o, const char *text, void *to, s
     return true;
 }
 
-/* The next text of a list with room for `most`. */
+/* Appends the argument to a list of *num texts with room for `most`. */
 static bool add_text(const struct cli_option *o, const struct cli *c, const char **to, int *num,
                      int most, struct err *e)
 {

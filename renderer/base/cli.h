@@ -1,6 +1,6 @@
-/* Command lines: a table of options that is the --help text and says where each value goes and what
- * it may be, and strict number parsing. Shared by both programs. An option may take several
- * arguments, as the assignment's -r W H does; those of W H may be one word, 480x360. */
+/* Command lines: a table of options that gives the --help text, where each value is stored and which
+ * values are valid; and strict number parsing. Shared by both programs. An option may take several
+ * arguments, like the assignment's -r W H; W H may also be written as one word, 480x360. */
 #ifndef ASSAY_CLI_H
 #define ASSAY_CLI_H
 
@@ -10,8 +10,8 @@
 #include <stdint.h>
 #include <stdio.h>
 
-/* A number above 0 is multiplied by the value of its suffix (one character) or else by that of the
- * row with a NULL name. */
+/* A positive number is multiplied by the value of its one-character suffix or, without a suffix, by
+ * that of the row whose name is NULL. */
 struct cli_unit {
     const char *name;
     double value;
@@ -31,30 +31,30 @@ enum cli_kind {
     CLI_REST
 };
 
-/* A row. The value goes to a member of the command's settings, whose type says how it is read. A
- * table ends with a row without a name, which describes the positional arguments: {0} if the
- * command takes none. */
+/* A row of the table. The value is stored in a member of the command's settings struct, whose type
+ * decides how it is parsed. A table ends with a row without a name, which describes the positional
+ * arguments: {0} if the command takes none. */
 struct cli_option {
     char short_name;       /* 0: none */
     const char *long_name; /* without dashes */
     const char *args;      /* as shown in the help, a word for each of up to 4: "W H"; "": none */
     const char *help;      /* with default and unit; '\n' starts a new line */
-    enum cli_kind kind;    /* this and the next by one of the macros below */
+    enum cli_kind kind;    /* this and `to`: set by one of the macros below */
     size_t to;
     double lo,
-        hi; /* of a number; lo: what an int becomes without arguments, or by the first of the names */
-    const char *const *names;    /* a text is one of these, an int lo + its index; NULL: any */
+        hi; /* range; lo: also of an int without arguments, or with the first of the names */
+    const char *const *names;    /* valid words; an int becomes lo + the index; NULL: any */
     const struct cli_unit *unit; /* of a double: the suffixes it may have (cli_time_units: s, m, h).
                                   * The number before the suffix is then at least 1e-9 and at most
                                   * hi; lo is not used. NULL: no suffix */
-    size_t num;                  /* CLI_LIST: where the int is that counts */
-    const char *noun;            /* what a CLI_LIST or CLI_RANGE is of, for messages */
+    size_t num;                  /* CLI_LIST: offset of the int that counts the texts */
+    const char *noun;            /* CLI_LIST, CLI_RANGE: what an element is called in messages */
     bool (*read)(void *settings, const char *const value[4], struct err *e); /* CLI_READ: does it */
-    bool stops;        /* nothing is read after it */
-    const char *usage; /* of --help: stops, and prints this and the table; NULL: does not */
+    bool stops;        /* no word after it is read */
+    const char *usage; /* of --help: cli_read() prints this and the table, and stops; else NULL */
 };
 
-/* The kind and the place of a member of struct `type`. Several arguments go into as many members in a row. */
+/* Sets kind and offset from a member of struct `type`. Several arguments are stored in as many consecutive members. */
 #define CLI_TO(type, member)                                                                       \
     .kind = _Generic(((type *)0)->member,                                                          \
                      bool: CLI_FLAG,                                                               \
@@ -66,16 +66,16 @@ struct cli_option {
                      const char *: CLI_TEXT,                                                       \
                      const char **: CLI_TEXT),                                                     \
     .to = offsetof(type, member)
-/* An option that may be given again: an array of texts, and the int that counts them. */
+/* An option that may be repeated: `member` is an array of texts, `count` the int that counts them. */
 #define CLI_TO_LIST(type, member, count)                                                           \
     .kind = CLI_LIST, .to = offsetof(type, member), .num = offsetof(type, count),                  \
     .hi = sizeof((type *)0)->member / sizeof(const char *)
-/* A:B, 0 <= A < B <= hi, into the int `member` and the one behind it. */
+/* A:B, 0 <= A < B <= hi, stored in the int `member` and the int after it. */
 #define CLI_TO_RANGE(type, member) .kind = CLI_RANGE, .to = offsetof(type, member)
-/* Of the last row: the words from the first that is no option on are another command; its index. */
+/* For the last row: the first word that is no option starts another command; stores its index in argv. */
 #define CLI_TO_REST(type, member) .kind = CLI_REST, .to = offsetof(type, member), .stops = true
-/* Reads the words into *settings, which hold the defaults. False with one line on what is no
- * option, no value of it, or one word too many. Text is that of argv. */
+/* Parses the command line into *settings, which must hold the defaults. False with a line on an
+ * unknown option, an invalid value or an excess argument. Texts point into argv. */
 NODISCARD bool cli_read(const struct cli_option *options, int argc, char **argv, void *settings,
                         struct err *e);
 
@@ -93,21 +93,21 @@ struct cli {
 
 enum { CLI_END = -1, CLI_POSITIONAL = -2, CLI_ERROR = -3 };
 
-/* The index of the next option in the table, CLI_POSITIONAL (value[0] holds it), CLI_END or
- * CLI_ERROR (e says what). "--" ends the options; --name=value and -nvalue work for one
- * argument, and short options without any may stand together, as getopt has it. */
+/* Returns the table's index of the next option, CLI_POSITIONAL (value[0] holds it), CLI_END or
+ * CLI_ERROR (with a line in *e). As with getopt, "--" ends the options, --name=value and -nvalue
+ * work for options with one argument, and short options without arguments may be joined. */
 int cli_next(struct cli *c, struct err *e);
 
-/* The words of a command that parsed, with short options split ("-qj4" into "-q -j 4"), for callers
- * that store commands or drop words: a NULL-terminated array, to free(), that points into argv too.
- * NULL: out of memory. */
+/* The words of a command line that has parsed without error, with short options split ("-qj4" into
+ * "-q -j 4"), for callers that store commands or drop words: a NULL-terminated array, some of whose
+ * words point into argv. The caller frees it. NULL: out of memory. */
 NODISCARD char **cli_apart(const struct cli_option *options, int argc, char **argv);
 
 /* Prints the text and then the table in two columns on stdout. */
 void cli_print_help(const char *usage, const struct cli_option *options);
 
-/* The whole of `text` must be a number inside [lo, hi]; `what` names it in the line. A whole one
- * may be written as 1e3. */
+/* The whole of `text` must be a number within [lo, hi]; `what` names it in the error line. cli_int()
+ * also accepts 1e3; cli_uint64() and cli_uint32() also 0x... and octal. */
 NODISCARD bool cli_int(const char *what, const char *text, long lo, long hi, int *out,
                        struct err *e);
 NODISCARD bool cli_uint64(const char *what, const char *text, uint64_t *out, struct err *e);
@@ -115,17 +115,17 @@ NODISCARD bool cli_uint32(const char *what, const char *text, uint32_t *out, str
 NODISCARD bool cli_double(const char *what, const char *text, double lo, double hi, double *out,
                           struct err *e);
 
-/* Index of `text` in a NULL-terminated list of words; fails naming the list. */
+/* Index of `text` in a NULL-terminated list of words. Fails with a line that lists the words. */
 NODISCARD bool cli_choice(const char *what, const char *text, const char *const *words, int *out,
                           struct err *e);
 
-/* Of the words next(list, i), i = 0, 1, .. until NULL, the one probably meant: with the fewest
- * letters to change, insert, drop or swap with their neighbours, at most a third of them; NULL:
- * none. */
+/* Among the words next(list, 0), next(list, 1), ... up to NULL, the one that `word` (up to its '=')
+ * was probably meant to be: the fewest letters to change, insert, delete or swap with a neighbour,
+ * at most a third of its length. NULL if none is that close. */
 const char *cli_nearest(const char *word, const char *(*next)(const void *list, size_t i),
                         const void *list);
 
-/* What --threads is where nobody says: the processors of the machine, at most 1024. */
+/* Default of --threads: the number of processors that are online, 1 to 1024. */
 int cli_processors(void);
 
 #endif

@@ -9,7 +9,7 @@ const struct option_words cli_rewrite_render[] = {
     {"--resume", 1}, {"--heatmap", 1}, {"--keep-state", 0},
     {"-q", 0},       {"--quiet", 0},   {0}};
 
-/* How many words from word[0] on to leave out by the table: 0, or an option and its arguments, `left` at most. */
+/* Number of words at word[0] that the table drops: 0, or an option with its arguments; at most `left`. */
 static int cli_rewrite_to_drop(const struct option_words *table, char *const *word, int left)
 {
     for (const struct option_words *o = table; o->name != NULL; o++) {

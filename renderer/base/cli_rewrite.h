@@ -1,4 +1,4 @@
-/* Words of a command line that are to be left out when it is run again in another way. */
+/* Dropping options from a command line that is to be run again in another way. */
 #ifndef ASSAY_CLI_REWRITE_H
 #define ASSAY_CLI_REWRITE_H
 

@@ -15,7 +15,7 @@ struct err {
 /* For a function whose return value must not be ignored. */
 #define NODISCARD __attribute__((warn_unused_result))
 
-/* Formats the line into e (truncating quietly at its size; e may be NULL), a '?' for each control character.
+/* Formats the line into *e, silently cut at its size, with a '?' for each control character. e may be NULL.
  * Always returns false, so that a failing function can `return err_set(e, "...")`. */
 bool err_set(struct err *e, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
 
@@ -23,15 +23,15 @@ bool err_set(struct err *e, const char *fmt, ...) __attribute__((format(printf, 
  * returns false. */
 bool err_prefix(struct err *e, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
 
-/* Does the line say that memory ran out, in our words or those of the C library or OpenEXR? Then it
- * says nothing about the file that was read. For callers that would otherwise blame that file. */
+/* True if the line reports lack of memory, in our words or those of the C library or OpenEXR: then
+ * the file that was being read is not at fault. */
 bool err_is_of_memory(const struct err *e);
 
-/* Each control character becomes a '?'. What a file or a library said may end up in a line: a terminal must not obey
- * it, and a log must not take it for two lines. */
+/* Replaces each control character in place by '?': text from files and libraries ends up in error lines and must
+ * neither control a terminal nor look like two lines in a log. */
 void err_hide_controls(char *text);
 
-/* `make lint` looks at one file at a time and would follow the paths on which these return true. */
+/* The analyzer of `make lint` sees one file at a time and would otherwise assume that these may return true. */
 #ifdef __clang_analyzer__
 #define err_set(...)    ((void)err_set(__VA_ARGS__), false)
 #define err_prefix(...) ((void)err_prefix(__VA_ARGS__), false)

@@ -136,8 +136,9 @@ bool fs_make_parent_dirs(const char *path, struct err *e)
 
 enum { DEEP = 16 };
 
-/* Removes what `name` in the open directory `dir` is. Whoever may write there may put a link or another folder in its place meanwhile:
- * no path is ever followed. Folders that lie deep are first moved to `top`, so that neither descriptors nor the stack run out. */
+/* Removes the file or folder `name` in the open directory `dir`. Follows no path and no link, since another process may
+ * replace parts of the tree meanwhile. Folders DEEP levels down are moved to `top` first, so that neither descriptors
+ * nor the stack run out. False with errno. */
 static bool remove_at(int top, int dir, const char *name, int depth, unsigned *moved)
 {
     struct stat st;
@@ -174,7 +175,7 @@ bool fs_remove_tree(const char *path, struct err *e)
 {
     unsigned moved = 0, before;
     bool ok;
-    do { /* folders that were moved to the top may have been missed */
+    do { /* readdir() may have missed folders that were moved to the top */
         before = moved;
         ok = remove_at(-1, AT_FDCWD, path, 0, &moved);
     } while (!ok && moved > before);
@@ -214,7 +215,7 @@ struct path fs_beside_program(const char *name)
     Dl_info library;
     ssize_t n = readlink("/proc/self/exe", self, sizeof self - 1);
     self[n > 0 ? n : 0] = '\0';
-    /* In libassay.so the program is somebody else's. */
+    /* In libassay.so, /proc/self/exe is the program of whoever loaded the library. */
     if (dladdr((const void *)fs_beside_program, &library) != 0 &&
         strstr(fs_base(library.dli_fname), ".so") != NULL)
         if (realpath(library.dli_fname, self) == NULL)

@@ -7,8 +7,8 @@
 #include <limits.h>
 #include <stdio.h>
 
-/* A path put together from parts. If too long for the system it is cut, but stays too long: every use of it fails, none
- * touches another file. */
+/* A path composed from parts. A longer one is cut at PATH_MAX characters, which is still too long for the system: every
+ * use of it fails instead of touching another file. */
 struct path {
     char s[PATH_MAX + 1];
 };
@@ -28,31 +28,32 @@ NODISCARD bool out_open(struct out_file *o, const char *path, struct err *e);
 NODISCARD bool out_commit(struct out_file *o, struct err *e);
 /* Closes and removes the temporary. */
 void out_abandon(struct out_file *o);
-/* Can a file be written at path? To ask before hours of work. False with the line of out_open(), or if path is a directory.
+/* Checks, before hours of work, that a file can be written at path: false with a line if not, or for a directory.
  * Leaves nothing behind. */
 NODISCARD bool out_check(const char *path, struct err *e);
 
 /* Opens a regular file or a directory for reading. NULL with errno: ENOTSUP for a FIFO (would block) or a device (may not end).
  * The caller closes it. */
 FILE *fs_open(const char *path);
-/* The same as a descriptor; -1. */
+/* The same, but a file descriptor; -1 with errno on failure. */
 int fs_open_fd(const char *path);
 
 /* mkdir -p. */
 NODISCARD bool fs_make_dirs(const char *path, struct err *e);
 /* mkdir -p of the directory part of path. */
 NODISCARD bool fs_make_parent_dirs(const char *path, struct err *e);
-/* rm -r of a directory that we made; missing is fine. No link in it is followed, also where others change it meanwhile. */
+/* rm -r of a directory that we made; it may be missing. Follows no link in it, even if others change it meanwhile. */
 NODISCARD bool fs_remove_tree(const char *path, struct err *e);
 
-/* Copies a file; everybody may read the copy. */
+/* Copies a file; the copy has mode 0644. */
 NODISCARD bool fs_copy(const char *from, const char *to, struct err *e);
-/* The name of a file without its directories, within `path`. */
+/* The last component of `path`: a pointer into it. */
 const char *fs_base(const char *path);
 /* The file `name` in the directory of the file `path`. */
 struct path fs_beside_file(const char *path, const char *name);
 
-/* The file `name` beside the program that runs (where this is a part of libassay.so: beside that), or in the current directory if that cannot be known. */
+/* The file `name` beside the running program (in libassay.so: beside the library), or in the current directory if that
+ * is not known. */
 struct path fs_beside_program(const char *name);
 
 #endif

@@ -13,7 +13,7 @@ void *huge_alloc(size_t size)
     size = (size + page - 1) / page * page;
     void *p = aligned_alloc(page, size);
     if (p != NULL && page == HUGE_PAGE)
-        madvise(p, size, MADV_HUGEPAGE); /* only advice: without it all works as well */
+        madvise(p, size, MADV_HUGEPAGE); /* only a hint; its failure does no harm */
     return p;
 }
 

@@ -7,10 +7,10 @@
 #include <stddef.h>
 
 /* `size` bytes, aligned to 64; an array of megabytes lies on large pages where the system has them:
- * fewer misses of the page table. Not zeroed. The caller's, to free(); NULL if out of memory. */
+ * fewer TLB misses. Not zeroed. The caller frees it; NULL if out of memory. */
 NODISCARD void *huge_alloc(size_t size);
-/* As calloc(); megabytes lie on large pages where the system has them, for the most part: fewer faults
- * when they are touched first. The caller's, to free(). */
+/* Like calloc(); most of an array of megabytes lies on large pages where the system has them, so that
+ * first touching it causes fewer page faults. The caller frees it; NULL if out of memory. */
 NODISCARD void *huge_calloc(size_t num, size_t size);
 
 #endif

@@ -16,9 +16,8 @@ static bool is_end(char c)
 }
 
 /* Digits up to 2^53 and a power of ten up to 10^22 are exact as doubles, so one multiplication or division
- * rounds the number rightly: W. D. Clinger, How to read floating point numbers accurately, PLDI 1990. What a
- * mesh is made of is that short, and strtod() takes five times as long. False: not that short, or not a
- * number. */
+ * rounds correctly: W. D. Clinger, How to read floating point numbers accurately, PLDI 1990. The numbers of
+ * meshes are nearly all that short, and strtod() takes five times as long. False: longer, or not a number. */
 static bool parse_short(const char *s, const char **end, double *out)
 {
     static const double power[] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,

@@ -5,8 +5,8 @@
 
 enum { MAX_THREADS = 256 };
 
-/* Runs `main` on up to `threads` threads, this one included, and waits for all. Where no more threads can be had
- * fewer do the same. */
+/* Runs `main` on up to `threads` threads (and at most MAX_THREADS + 1), this one included, and waits for all. If
+ * fewer can be created, those do all the work. */
 static void run(int threads, void *(*main)(void *), void *arg)
 {
     pthread_t thread[MAX_THREADS];
@@ -48,7 +48,7 @@ void parallel_for(int threads, size_t n, void (*work)(void *ctx, size_t first, s
             work(ctx, 0, n);
         return;
     }
-    /* Several parts for each, since some run slower than others. */
+    /* Several parts per thread, since some take longer than others. */
     struct range r = {.step = n / (8 * (size_t)threads) + 1, .end = n, .work = work, .ctx = ctx};
     pthread_mutex_init(&r.lock, NULL);
     run(threads, take_parts, &r);

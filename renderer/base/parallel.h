@@ -7,8 +7,8 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/* Cuts 0 .. n-1 into parts and calls work(ctx, first, last) for each, on up to `threads` threads.
- * Waits for all. */
+/* Cuts 0 .. n-1 into parts and calls work(ctx, first, last) for each, elements first .. last-1, on
+ * up to `threads` threads. Returns when all are done. */
 void parallel_for(int threads, size_t n, void (*work)(void *ctx, size_t first, size_t last),
                   void *ctx);
 
@@ -20,9 +20,9 @@ struct parallel_task {
     _Alignas(32) unsigned char what[PARALLEL_TASK];
 };
 
-/* Calls work(ctx, t, more) for the first task and all that come of it, on up to `threads` threads. work()
- * returns how many tasks it put into `more`, 0 to 2, or -1 on failure. False, when all threads have
- * ended, on failure or out of memory. */
+/* Calls work(ctx, t, more) for the first task and all that it splits into, on up to `threads` threads.
+ * work() returns how many tasks it put into `more`, 0 to 2, or -1 on failure. Returns when all threads
+ * have ended; false if a task failed or memory ran out. */
 NODISCARD bool parallel_divide(int threads, const struct parallel_task *first,
                                int (*work)(void *ctx, const struct parallel_task *t,
                                            struct parallel_task more[2]),

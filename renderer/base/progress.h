@@ -1,5 +1,5 @@
-/* How far a long job is: a bar with rate and time left on a terminal, a plain line now and then in
- * a log. Always on stderr. */
+/* Progress of a long job: a bar with rate and remaining time on a terminal, a plain line now and then
+ * in a log. Always on stderr. */
 #ifndef ASSAY_PROGRESS_H
 #define ASSAY_PROGRESS_H
 
@@ -13,7 +13,7 @@ struct progress {
     double start, last; /* seconds */
 };
 
-/* Wall-clock seconds of a clock that never jumps. */
+/* Seconds of a monotonic clock. */
 double progress_seconds(void);
 
 void progress_start(struct progress *p, const char *what, const char *unit, bool quiet);

@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* One word at `to`, which has room for it, in quotes where a shell would need them; returns its end. */
+/* Writes one word to `to`, which has room for it, quoted where a shell needs it; returns its end. */
 static char *append(char *to, const char *word)
 {
     static const char safe[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789"
@@ -39,7 +39,7 @@ char *shell_quote_join(const char *first, const char *const *word)
     return text;
 }
 
-/* One word from *text on, unquoted to *to with its zero; false on what is not accepted. */
+/* Unquotes the word at *text to *to, with a terminating zero, and advances both; false if it is not accepted. */
 static bool take_word(const char **text, char **to)
 {
     const char *c = *text;

@@ -1,4 +1,4 @@
-/* A command line as one text and back: what provenance stores, and what a person can paste into a shell. */
+/* A command line as one text and back, for provenance records and for pasting into a shell. */
 #ifndef ASSAY_SHELL_QUOTE_H
 #define ASSAY_SHELL_QUOTE_H
 
@@ -8,9 +8,9 @@
  * The caller frees the text. NULL if out of memory. */
 NODISCARD char *shell_quote_join(const char *first, const char *const *word);
 
-/* The words of a text that shell_quote_join() made, or that a person typed with blanks, '...' and \ alone: a NULL-terminated
- * array, one block of memory, to free(). NULL with a line on anything else that a shell would act on, on an open quote,
- * and out of memory. */
+/* Splits a text that shell_quote_join() made, or that a person typed with only blanks, '...' and \ as syntax, into a
+ * NULL-terminated array in one block of memory, which the caller frees. NULL with a line on anything else that a shell
+ * would interpret, on an unclosed quote, or out of memory. */
 NODISCARD char **shell_quote_split(const char *text, int *num, struct err *e);
 
 #endif

@@ -113,15 +113,15 @@ static vec3 safe_inverse(vec3 d)
               1 / (fabsf(d.z) < tiny ? copysignf(tiny, d.z) : d.z));
 }
 
-/* A ray as the boxes want it. */
+/* A ray prepared for the slab test. */
 struct slab_ray {
     vec3 before, behind, inv; /* origin for the lower and for the upper planes; 1/d */
 };
 
-/* The triangle test moves the corners by its own rounding, at most 6 half steps of float of their
- * distance from the origin. A box has to be hit by every ray that the test lets hit what is in it,
- * or rays slip through the edges of neighbours in different boxes [Woop13 3.3]; so the boxes are
- * grown by 8, of the largest distance and coordinate there is. */
+/* Rounding in the triangle test displaces corners by at most 6 half ulps of their distance from the
+ * ray's origin. A box must be hit by every ray for which the test accepts a primitive in it, or rays
+ * slip through edges that different boxes share [Woop13 3.3]; so boxes are grown by 8 half ulps of
+ * the sum of the largest distance and the largest coordinate. */
 static struct slab_ray slab_ray(const struct bvh *t, const ray *r)
 {
     const struct box *root = &t->nodes[0].box;
@@ -134,7 +134,7 @@ static struct slab_ray slab_ray(const struct bvh *t, const ray *r)
     return (struct slab_ray){add(r->o, grow), sub(r->o, grow), safe_inverse(r->d)};
 }
 
-/* Entry and exit of the slabs, the exit widened by the rounding of three operations [Ize13]. */
+/* Slab test; the exit distance is increased by the rounding of three operations [Ize13]. */
 static bool box_hit(const struct box *b, const struct slab_ray *r, float tmin, float tmax)
 {
     float x0 = (b->min.x - r->before.x) * r->inv.x, x1 = (b->max.x - r->behind.x) * r->inv.x;

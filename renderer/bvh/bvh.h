@@ -25,24 +25,25 @@ struct bvh; /* opaque; refers to the scene, which must outlive it */
 
 /* NULL on failure (out of memory). */
 NODISCARD struct bvh *bvh_build(const struct scene *s, enum bvh_kind kind, struct err *e);
-/* The same with the instructions of BVH_WIDE chosen (it has no scalar version: ISA_SCALAR is as
- * ISA_AUTO), and built on up to `threads` threads where the kind can (BVH_WIDE): the same tree. Fails too if the machine
- * lacks the instructions. */
+/* The same with a choice of the instruction set (BVH_WIDE only, which has no scalar version:
+ * ISA_SCALAR acts as ISA_AUTO) and of the number of threads that build (BVH_WIDE only; the tree does
+ * not depend on it). Also fails if the machine lacks the instructions. */
 NODISCARD struct bvh *bvh_build_on(const struct scene *s, enum bvh_kind kind, enum isa isa,
                                    int threads, struct err *e);
 void bvh_free(struct bvh *b);
 
-/* Expected cost of a random ray in primitive tests, a box test counting as one [MacDonald90];
- * and the size of the tree, also in bytes. */
+/* Expected cost of a random ray, in primitive tests, where a box test counts as one [MacDonald90].
+ * Then the size of the tree; bvh_size() is in bytes. */
 double bvh_sah_cost(const struct bvh *b);
 int bvh_depth(const struct bvh *b);
 uint32_t bvh_num_nodes(const struct bvh *b);
 size_t bvh_size(const struct bvh *b);
 
-/* For the listed lanes: nearest hit inside (tmin, tmax) into h, h->prim = NO_HIT if none. */
+/* For the listed lanes: stores the nearest hit inside (tmin, tmax) in *h, h->prim = NO_HIT if there is
+ * none, and adds the cost to *stats. */
 void bvh_closest(const struct bvh *b, const struct rays *r, const uint16_t *lane, int num_lanes,
                  struct hits *h, struct bvh_stats *stats);
-/* For the listed lanes: occluded[lane] tells if there is any hit inside (tmin, tmax). */
+/* For the listed lanes: sets occluded[lane] if there is any hit inside (tmin, tmax), else clears it. */
 void bvh_occluded(const struct bvh *b, const struct rays *r, const uint16_t *lane, int num_lanes,
                   bool *occluded, struct bvh_stats *stats);
 

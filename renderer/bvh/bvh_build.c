@@ -8,7 +8,7 @@
 enum {
     MAX_LEAF = 4,
     NUM_BINS = 16,
-    /* Past this depth a node is split in the middle of its list, which 32 cuts use up. */
+    /* Beyond this depth a node's list is halved: 32 halvings use up any list. */
     MAX_FREE_DEPTH = BVH_MAX_DEPTH - 32
 };
 
@@ -40,8 +40,8 @@ struct build {
     struct box *boxes; /* by primitive */
 };
 
-/* Where to cut primitives [first, first+count) of the list: along which axis, and how many of them
- * go left after a partition by value; false if no cut along an axis helps. */
+/* Where to cut entries [first, first + count) of the list: *axis, and *value, the mean centroid along
+ * it. False if all centroids coincide. */
 static bool choose_centroid_split(const struct build *b, uint32_t first, uint32_t count,
                                   struct box centroids, int *axis, float *value)
 {
@@ -60,6 +60,8 @@ static int bin_of(float c, float lo, float scale_to_bins)
     return k < 0 ? 0 : k >= NUM_BINS ? NUM_BINS - 1 : k;
 }
 
+/* The same by the surface area heuristic: *value is the first bin that goes right. Also false where a
+ * leaf costs no more. */
 static bool choose_sah_split(const struct build *b, uint32_t first, uint32_t count, struct box node,
                              struct box centroids, int *axis, float *value)
 {
@@ -108,7 +110,7 @@ static bool choose_sah_split(const struct build *b, uint32_t first, uint32_t cou
     return count > MAX_LEAF || best + half_area(node) < half_area(node) * (float)count;
 }
 
-/* Partitions the list by the chosen cut; how many went left. */
+/* Partitions the list by the chosen cut; returns how many went left. */
 static uint32_t partition(const struct build *b, uint32_t first, uint32_t count,
                           struct box centroids, int axis, float value)
 {

@@ -8,10 +8,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Rays are traversed in turns, one step of each (single_in_turns()), if the tree has more than
- * IN_TURNS_FROM bytes, as its nodes are then rarely in the cache, and if a random ray costs fewer
- * than IN_TURNS_TESTS tests. More tests mean boxes that overlap heavily: then all rays visit the
- * same nodes, and those are in the cache. */
+/* Rays advance in turns, one step each (single_in_turns()), if the tree has more than IN_TURNS_FROM
+ * bytes, as its nodes are then rarely in the cache, and if a random ray costs fewer than
+ * IN_TURNS_TESTS tests. More tests mean boxes that overlap heavily: then all rays visit the same
+ * nodes, which are in the cache. */
 enum { IN_TURNS_FROM = 16 << 20, IN_TURNS_TESTS = 64 };
 
 /* A leaf that has its place and is not filled yet. */
@@ -32,14 +32,14 @@ struct build {
     double root_area;
 };
 
-/* Room for `size` bytes more; what there is may move. */
+/* Makes room for `size` more bytes in the arena, which may move. False if out of memory or references. */
 static bool reserve(struct build *b, size_t size)
 {
     struct wide *w = b->w;
     if (w->used + size <= b->capacity)
         return true;
     if (w->used + size > WIDE_PLACE)
-        return false; /* references end here, at some 8 10^7 triangles */
+        return false; /* largest offset of a reference, at about 8e7 triangles */
     size_t capacity = b->capacity + b->capacity / 2 + size;
     char *larger = huge_alloc(capacity);
     if (larger == NULL)
@@ -113,7 +113,7 @@ static void fill_leaves(void *ctx, size_t first, size_t last)
     }
 }
 
-/* Appends one to be filled later; the reference, or WIDE_PLACE if out of memory. */
+/* Appends a leaf, to be filled later. Returns its reference, or WIDE_PLACE if out of memory. */
 static uint32_t add_leaf(struct build *b, const struct wide_range *r)
 {
     struct wide *w = b->w;
@@ -135,12 +135,13 @@ static uint32_t add_leaf(struct build *b, const struct wide_range *r)
     return ref;
 }
 
+/* Probability that a random ray through the scene meets the box. */
 static double chance(const struct build *b, const struct wide_box *box)
 {
     return b->root_area > 0 ? (double)wide_half_area(box) / b->root_area : 1;
 }
 
-/* Part i as a node and what is below. False if out of memory. */
+/* Appends part i as a node, with its subtree. False if out of memory. */
 static bool add_node(struct build *b, uint32_t i, int depth)
 {
     const struct wide_part *part = b->parts.part;
@@ -161,7 +162,7 @@ static bool add_node(struct build *b, uint32_t i, int depth)
             node.plane[2 * a][k] = k < n ? part[child[k]].box.v[a] : INFINITY;
             node.plane[2 * a + 1][k] = k < n ? -part[child[k]].box.v[4 + a] : -INFINITY;
         }
-    /* Leaves lie behind their node. */
+    /* Leaves are stored right after their node. */
     for (int k = 0; k < n; k++) {
         const struct wide_part *c = &part[child[k]];
         if (c->left != 0)
@@ -188,7 +189,7 @@ static bool add_tree(struct build *b, const struct wide_range *all)
            add_node(b, 0, 0);
 }
 
-/* Of `num` primitives. False if out of memory. */
+/* Makes the list, of `num` primitives. False if out of memory. */
 static bool add_list(struct build *b, const uint32_t *prim, uint32_t num)
 {
     struct wide *w = b->w;
@@ -208,9 +209,9 @@ static bool add_all_as_list(struct build *b, uint32_t num)
     return add_list(b, prim, num);
 }
 
-/* The walls of a room would be in every ray's way down the tree. Takes them out of `all`: primitives that
- * a random ray through the scene meets the box of by more than LARGE_PART, if there are few. The rest
- * follow, in their order. False if out of memory. */
+/* Large primitives, such as the walls of a room, would lie in every ray's way through the tree. take_large()
+ * moves them to the list: those whose boxes a random ray through the scene meets with a probability above
+ * LARGE_PART, if there are at most MOST_LARGE. The others stay in `all`, in their order. False if out of memory. */
 enum { MOST_LARGE = 16 };
 #define LARGE_PART (1.0 / 32)
 

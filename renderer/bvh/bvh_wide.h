@@ -13,8 +13,8 @@
 
 enum { WIDTH = 8, WIDE_FLAT = 32, WIDE_LINE = 64 };
 
-/* A reference to a node or leaf: its place in the arena in bytes, a multiple of 64, and in the low bits
- * what it is; nothing for a node. */
+/* A reference to a node or leaf: its offset in the arena in bytes, a multiple of 64. The low bits tell what
+ * it is: none for a node, WIDE_LEAF, or WIDE_LEAF | WIDE_SPHERES. */
 #define WIDE_LEAF    1u
 #define WIDE_SPHERES 2u
 #define WIDE_PLACE   0xffffffc0u
@@ -42,17 +42,17 @@ struct wide {
     char *arena;              /* nodes and leaves; at 0 the root */
     size_t used;              /* bytes */
     const struct traverse *kernel;
-    const struct small_scene_trace *list; /* its kernel */
+    const struct small_scene_trace *list; /* the list's kernel */
     float min[3], max[3];                 /* of the scene */
     float tree_min[3], tree_max[3];       /* of what is in the tree */
-    uint32_t num_list_leaves;             /* what the list counts as in tests */
-    uint32_t num_nodes, num_leaves;       /* num_nodes 0: a list */
+    uint32_t num_list_leaves;             /* leaf tests that the list counts as */
+    uint32_t num_nodes, num_leaves;       /* num_nodes 0: only a list */
     uint32_t num_triangles; /* of the scene: sphere i is primitive num_triangles + i */
     int depth;
-    bool in_turns; /* rays go through the tree in turns, since it is larger than the cache */
+    bool in_turns; /* rays advance through the tree in turns (bvh_wide.c) */
     float
-        alike; /* rays that start as near to each other may go as a packet: a few leaves of a surface
-                    that fills the scene */
+        alike; /* largest distance between origins of rays that may go as a packet: a few leaves of
+                    a surface that fills the scene */
     double cost; /* expected tests of a node or leaf for a random ray */
 };
 

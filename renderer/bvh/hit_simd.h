@@ -6,7 +6,7 @@
 
 #include "renderer/math/simd.h"
 
-/* Lanes where both products rounded to the same: again in double, where they are exact (shape.c). */
+/* Recomputes, in lanes where both products rounded to the same, e in double, where products are exact (shape.c). */
 static __attribute__((noinline, cold)) void edge_exact(const vf *ax, const vf *ay, const vf *bx,
                                                        const vf *by, vf *e)
 {
@@ -16,8 +16,8 @@ static __attribute__((noinline, cold)) void edge_exact(const vf *ax, const vf *a
                 (float)((double)(*ax)[i] * (double)(*by)[i] - (double)(*ay)[i] * (double)(*bx)[i]);
 }
 
-/* triangle_intersect() but for the comparison of t: lanes that pass. o, x, y, z in the order of the
- * shear, corners already moved to the origin along z; s as in struct shear. */
+/* triangle_intersect() without the comparison of t; returns the lanes that pass. x, y, z: the corners
+ * in the sheared frame, whose origin is that of the ray; sz: as in struct shear. */
 INLINE vi sheared_hit(const vf x[3], const vf y[3], const vf z[3], vf sz, vf *t, vf *u, vf *v)
 {
     vf e0 = x[1] * y[2] - y[1] * x[2];
@@ -34,7 +34,7 @@ INLINE vi sheared_hit(const vf x[3], const vf y[3], const vf z[3], vf sz, vf *t,
         edge_exact(&x[0], &y[0], &x[1], &y[1], &e2);
         pass = ~(vf_lt(vf_min(vf_min(e0, e1), e2), zero) & vf_lt(zero, vf_max(vf_max(e0, e1), e2)));
     }
-    /* Of no area: the inverse is infinite, t is NaN, and no comparison lets it through. */
+    /* Without area the inverse is infinite and t is NaN, which fails every comparison. */
     vf inv = 1 / (e0 + e1 + e2);
     *u = e1 * inv;
     *v = e2 * inv;
@@ -42,7 +42,7 @@ INLINE vi sheared_hit(const vf x[3], const vf y[3], const vf z[3], vf sz, vf *t,
     return pass;
 }
 
-/* sphere_intersect(): f from centre to origin. */
+/* sphere_intersect() within (tmin, limit]. f: from the centre to the ray's origin. */
 INLINE vi sphere_hit(vf fx, vf fy, vf fz, vf dx, vf dy, vf dz, vf radius, vf tmin, vf limit, vf *t)
 {
     vf b = -(fx * dx + fy * dy + fz * dz);

@@ -1,4 +1,4 @@
-/* Rays of a batch, lane by lane what boxes and primitives want of each. Part of traverse.c and
+/* Rays of a batch in lanes, with what the tests of boxes and primitives need. Part of traverse.c and
  * small_scene_trace.c. */
 #ifndef ASSAY_RAY_SIMD_H
 #define ASSAY_RAY_SIMD_H
@@ -8,7 +8,7 @@
 
 #include <float.h>
 
-enum { NOTHING = INT32_MAX /* no primitive yet: more than any */ };
+enum { NOTHING = INT32_MAX /* no primitive yet: above any number */ };
 
 struct rayv {
     vf o[3], d[3], sx, sy, sz, tmin, tmax;
@@ -16,8 +16,8 @@ struct rayv {
                  distance counts only if its number is smaller */
     vf u, v; /* with prim: what has been met so far */
     vi prim;
-    bool in_row;                   /* the lanes follow each other */
-    vf inv[3], enter[3], leave[3]; /* plane * inv - enter: t where the slab begins */
+    bool in_row;                   /* the lanes are consecutive */
+    vf inv[3], enter[3], leave[3]; /* plane * inv - enter: t of entry; - leave: of exit */
     vi axis;                       /* of the largest component of d, the third of the shear */
     vi ignore;
 };
@@ -45,7 +45,7 @@ INLINE void rayv_shear(struct rayv *q)
     q->sy = vf_select(is_x, q->d[2], vf_select(is_y, q->d[0], q->d[1])) * q->sz;
 }
 
-/* Origins, directions and ends. */
+/* Loads origins, directions, tmin and tmax. */
 INLINE void rayv_load(const struct rays *r, const uint16_t lane[LANES], struct rayv *q)
 {
     bool in_row = true;
@@ -62,7 +62,7 @@ INLINE void rayv_load(const struct rays *r, const uint16_t lane[LANES], struct r
     q->in_row = in_row;
 }
 
-/* Results of all lanes; prim -1: nothing. */
+/* Stores the results of all lanes; prim -1: nothing hit. */
 INLINE void rayv_store(const struct rayv *q, const uint16_t lane[LANES], vf t, vf u, vf v, vi prim,
                        struct hits *h)
 {
@@ -103,7 +103,7 @@ INLINE void rayv_init(const struct rays *r, const uint16_t lane[LANES], struct r
     q->prim = vi_set(NOTHING);
 }
 
-/* What has been met so far is in h. */
+/* Takes over the hits so far from *h. */
 INLINE void rayv_go_on(const struct hits *h, const uint16_t lane[LANES], struct rayv *q)
 {
     vi prim = (vi)gather(h->prim, lane, q->in_row), met = vi_lt(vi_set(-1), prim);
@@ -113,7 +113,7 @@ INLINE void rayv_go_on(const struct hits *h, const uint16_t lane[LANES], struct 
     q->v = gather(h->v, lane, q->in_row);
 }
 
-/* As many of a list of n as there are lanes, from k on; behind its end the last again. */
+/* LANES entries of a list of n from entry k on; past the end the last one is repeated (in `filled`). */
 static inline const uint16_t *rayv_from(const uint16_t *lane, int k, int n, uint16_t filled[LANES])
 {
     if (n - k >= LANES)
@@ -128,9 +128,9 @@ INLINE void rayv_ignore(const struct rays *r, const uint16_t lane[LANES], struct
     q->ignore = (vi)gather(r->ignore, lane, q->in_row);
 }
 
-/* What the coordinates of boxes are grown by. The triangle test moves corners by at most 6 half steps
- * of float of their distance from the origin [Woop13 3.3]; reciprocal, products and difference of the
- * slabs come to no more than 4 of distance and coordinate together. Twice that. */
+/* By how much boxes are grown. Rounding in the triangle test displaces corners by at most 6 half ulps of
+ * their distance from the ray's origin [Woop13 3.3]; the reciprocal, products and difference of the slab
+ * test add at most 4 half ulps of the distance plus the coordinate. Twice the sum. */
 INLINE vf growth(const struct wide *w, const struct rayv *q)
 {
     vf reach = vf_set(0), coordinate = reach;
@@ -141,7 +141,7 @@ INLINE vf growth(const struct wide *w, const struct rayv *q)
     return 10 * FLT_EPSILON * (reach + coordinate);
 }
 
-/* 1/d, of zeros and next to them a number as large that neither NaN nor infinity comes up. */
+/* 1/d, with components of d near zero replaced by a number large enough that no NaN or infinity arises. */
 INLINE vf inverse(vf d, vf grow)
 {
     vf tiny = vf_max(vf_set(1e-18f), grow * 1e-29f), sign = (vf)((vi)d & vi_set(INT32_MIN));

@@ -4,7 +4,7 @@
 
 #include <float.h>
 
-/* Minimum and maximum, or sum and minus sum, change places. */
+/* Exchanges the halves: minimum and negated maximum, or a sum and its negative. */
 INLINE vf swap_halves(vf a)
 {
     return __builtin_shufflevector(a, a, 4, 5, 6, 7, 0, 1, 2, 3);
@@ -45,7 +45,8 @@ static void split(const struct wide_item *item, uint32_t n, const struct wide_bo
         usable[a] = extent[a] > 0 && f < FLT_MAX;
         to_bins[a] = usable[a] ? f : 0;
     }
-    /* Neighbours fall into the same bins: by turns into two sets, so that one need not wait for the other. */
+    /* Consecutive items tend to fall into the same bin: they go into two sets of bins in turn, so that one update need
+     * not wait for the other. */
     const uint32_t other = n < 64 ? 0 : 1;
     vf both[2][3][WIDE_MAX_BINS], (*box)[WIDE_MAX_BINS] = both[0];
     uint32_t count[3][WIDE_MAX_BINS] = {{0}};
@@ -99,8 +100,8 @@ static void split(const struct wide_item *item, uint32_t n, const struct wide_bo
     }
 }
 
-/* Without a branch: to which side an item goes cannot be predicted. Those of the left side trade places with
- * the first of the right side. */
+/* Branch-free, since the side to which an item goes cannot be predicted. An item of the left side swaps places
+ * with the first one of the right side. */
 static uint32_t partition(struct wide_item *item, uint32_t n, const struct wide_split *s,
                           struct wide_box *left, struct wide_box *right)
 {

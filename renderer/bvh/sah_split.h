@@ -1,4 +1,4 @@
-/* Splits by the surface area heuristic, binned [Wald07]: the passes of the builder over all of them, compiled once
+/* Splits by the binned surface area heuristic [Wald07]: the builder's passes over all items of a range, compiled once
  * for each instruction set (isa.h). All give the same bits. */
 #ifndef ASSAY_SAH_SPLIT_H
 #define ASSAY_SAH_SPLIT_H
@@ -24,19 +24,19 @@ struct wide_box {
 struct wide_split {
     int axis, bin;
     float low, to_bins; /* bin of c = (int)((c - low) to_bins) */
-    float cost;         /* FLT_MAX: nowhere, all centres coincide */
+    float cost;         /* FLT_MAX: no cut, all centres coincide */
     struct wide_box left, right;
 };
 
 struct sah_split_passes {
-    /* By the surface area heuristic, a leaf of up to eight costing one. centres: box of the doubled
-     * centres. */
+    /* Finds the best cut by the surface area heuristic, a leaf of up to eight costing one. centres:
+     * box of the doubled centres. */
     void (*split)(const struct wide_item *item, uint32_t n, const struct wide_box *centres,
                   struct wide_split *out);
-    /* How many went left; the boxes of the doubled centres of both sides. */
+    /* Returns how many went left; *left, *right: boxes of the doubled centres of both sides. */
     uint32_t (*partition)(struct wide_item *item, uint32_t n, const struct wide_split *s,
                           struct wide_box *left, struct wide_box *right);
-    /* Box and box of the doubled centres. */
+    /* Box of the items and box of their doubled centres. */
     void (*bounds)(const struct wide_item *item, uint32_t n, struct wide_box *box,
                    struct wide_box *centres);
 };

@@ -42,8 +42,8 @@ static void set_row(float row[4], dvec3 a, double scale, dvec3 origin)
     row[3] = (float)(-d3_dot(a, origin) * scale);
 }
 
-/* With corner k of triangle i for the origin; false if rounding would be more than a few hundredths of
- * it. */
+/* Fills a face with corner k of triangle i as its origin; false if rounding could exceed a few hundredths
+ * of its size. */
 static bool set_face(const struct small_scene *f, int i, int k, struct flat_face *face)
 {
     dvec3 o = corner_of(f, i, k);
@@ -65,7 +65,7 @@ static bool set_face(const struct small_scene *f, int i, int k, struct flat_face
     return true;
 }
 
-/* The corner of triangle j that completes triangle i, seen from its corner k, to a parallelogram. */
+/* True if triangle j completes triangle i to a parallelogram, with the new corner opposite to corner k. */
 static bool completes(const struct small_scene *f, int i, int k, int j)
 {
     const uint8_t *a = f->triangle[i].corner, *b = f->triangle[j].corner;

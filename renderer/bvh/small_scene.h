@@ -15,8 +15,8 @@ enum { FLAT_CORNERS = 3 * WIDE_FLAT, FLAT_EDGES = 3 * WIDE_FLAT, FLAT_ROW = 16 }
 /* normal.p = offset on the plane; u = u_row.p + u_row[3], v likewise; 0 to 1 inside. */
 struct flat_face {
     float normal[3], offset, u_row[4], v_row[4];
-    float per_area;   /* 1 over that of the parallelogram of u and v */
-    int32_t prim[2];  /* where u + v < 1, and beyond */
+    float per_area;   /* 1 over the area of the parallelogram */
+    int32_t prim[2];  /* for u + v < 1, and above */
     bool is_triangle; /* prim[0] alone */
 };
 
@@ -33,19 +33,19 @@ struct small_scene {
     float row[WIDE_FLAT][FLAT_ROW]; /* of a triangle: its corners, one after the other */
     int32_t number[WIDE_FLAT]; /* of each triangle, then of each sphere, in the scene; ascending */
     float reach;               /* largest coordinate of a corner */
-    bool quick;                /* the quick form is there, and of use */
+    bool quick;                /* the quick form is filled and precise enough */
 };
 
-/* How far the quick form's u and v and the exact test's barycentric coordinates are apart, at most:
- * FLAT_ERROR m^2 per_area / |normal.d|, where no coordinate of corners and origin is above m. Twice the
- * sum of the roundings of rows, products and sums of both, and of a fourth corner that is
- * 8 FLT_EPSILON m off. Of t: FLAT_SLACK m / |normal.d|; the quick form's own roundings come to 14, those
- * of the exact test to 1 in the self-hit test of tests/renderer/bvh/test_bvh.c. It has to be less than the 32 by
- * which rays are moved off the surface that they leave, or that would always be in doubt. */
+/* Bounds on the differences between the quick form and the exact test. u and v (barycentric coordinates):
+ * FLAT_ERROR m^2 per_area / |normal.d|, m being the largest coordinate of corners and origin; twice the sum
+ * of the roundings of rows, products and sums in both, and of a fourth corner that is off by
+ * 8 FLT_EPSILON m. t: FLAT_SLACK m / |normal.d|; the quick form's own roundings come to 14 FLT_EPSILON, those
+ * of the exact test to 1 in no_self_intersection of tests/renderer/bvh/test_bvh.c. FLAT_SLACK has to be below
+ * the 32 FLT_EPSILON by which rays are moved off a surface, or that surface would always be in doubt. */
 #define FLAT_ERROR (512 * FLT_EPSILON)
 #define FLAT_SLACK (16 * FLT_EPSILON)
 
-/* Of up to WIDE_FLAT primitives of a scene, in ascending order. */
+/* Fills *f with up to WIDE_FLAT primitives of a scene; prim[] must ascend. */
 void small_scene_fill(const struct scene *s, const uint32_t *prim, int num, struct small_scene *f);
 
 #endif

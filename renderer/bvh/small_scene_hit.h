@@ -7,7 +7,7 @@
 #include "hit_simd.h"
 #include "ray_simd.h"
 
-/* Corners as the rays see them; edge functions in both directions, so that a triangle finds its own. */
+/* Corners in the rays' sheared frames, and edge functions in both directions, of which a triangle looks up its own. */
 struct list {
     vf x[FLAT_CORNERS], y[FLAT_CORNERS], z[FLAT_CORNERS], edge[FLAT_EDGES][2];
 };
@@ -36,13 +36,13 @@ INLINE void list_init(const struct small_scene *f, const struct rayv *q, struct 
         for (int i = 0; i < f->num_edges; i++) {
             const int a = f->edge[i][0], b = f->edge[i][1];
             edge_exact(&l->x[a], &l->y[a], &l->x[b], &l->y[b], &l->edge[i][0]);
-            /* By itself: what underflows keeps its sign, and 0 has none. */
+            /* Not by negation: a result that underflows keeps its sign, which 0 - e would lose. */
             edge_exact(&l->x[b], &l->y[b], &l->x[a], &l->y[a], &l->edge[i][1]);
         }
 }
 
-/* Triangle i against all rays, as sheared_hit(); lanes that meet it inside (tmin, limit). No branches:
- * some ray of eight or more is almost always inside, and when not cannot be predicted. */
+/* Tests triangle i against all rays like sheared_hit(); returns the lanes that meet it inside (tmin, limit).
+ * Branch-free: of eight or more rays one is almost always inside, and when none is cannot be predicted. */
 INLINE vi list_triangle(const struct small_scene *f, const struct list *l, int i,
                         const struct rayv *q, vf limit, vf *t, vf *u, vf *v)
 {
@@ -71,7 +71,7 @@ INLINE vi list_sphere(const struct small_scene *f, int i, const struct rayv *q, 
                       vf_set(s[3]), q->tmin, below(limit), t);
 }
 
-/* What each ray meets first. prim: place in the list, -1: nothing. */
+/* The nearest hit of each ray. prim: index in the list, -1: none. */
 struct list_hits {
     vf t, u, v;
     vi prim;
@@ -119,7 +119,7 @@ static __attribute__((noinline)) vi list_occluded_exact(const struct small_scene
     return met;
 }
 
-/* Rays to the quick form: bounds of its errors, per |normal.d|, and lanes that it serves. */
+/* What the quick form needs of the rays: error bounds, to be divided by |normal.d|, and the lanes that it serves. */
 struct quick {
     vf error, slack; /* FLAT_ERROR m^2, FLAT_SLACK m */
     vf end;          /* where the ray ends, or has left the scene */
@@ -134,13 +134,13 @@ INLINE struct quick quick_init(const struct small_scene *f, const struct rayv *q
                           vf_lt(m, vf_set(1e5f))};
 }
 
-/* Where a ray meets a face. `inside`: how far from the rim, in u or v; off by no more than `error`. t
- * lies in (low, high). */
+/* Where a ray meets a face's plane. inside: distance from the rim, in u or v, negative outside, with an
+ * error of at most `error`. t lies in (low, high). sum: u + v. */
 struct quick_hit {
     vf inside, error, low, high, sum;
 };
 
-/* normal.d, and how far the plane is from the origin along the normal. */
+/* normal.d, and the distance of the plane from the ray's origin along the normal. */
 struct quick_plane {
     vf nd, no;
 };
@@ -154,8 +154,8 @@ INLINE struct quick_plane quick_plane(const struct flat_face *face, const struct
     return (struct quick_plane){nd, no};
 }
 
-/* Lanes that begin and end on the same side of the plane, farther from it than rounding matters; at the
- * end that is twice as far, since k->end can be four times m. */
+/* Lanes whose rays begin and end on the same side of the plane, too far from it for rounding to matter; at
+ * the end twice as far, since k->end can be four times m. */
 INLINE vi quick_clear(const struct quick_plane *p, const struct quick *k)
 {
     vf end = mul_add(-k->end, p->nd, p->no);
@@ -168,7 +168,7 @@ INLINE struct quick_hit quick_face(const struct flat_face *face, const struct qu
 {
     const float *ur = face->u_row, *vr = face->v_row;
     const vf *o = q->o, *d = q->d, nd = p->nd, no = p->no;
-    /* Along the plane t is huge, and so is its error, but both are numbers. */
+    /* For rays parallel to the plane t and its error are huge, but finite. */
     vf inv = 1 / (nd + 1e-20f), t = no * inv;
     vf x = mul_add(t, d[0], o[0]), y = mul_add(t, d[1], o[1]), z = mul_add(t, d[2], o[2]);
     vf u = mul_add(vf_set(ur[0]), x,
@@ -184,8 +184,8 @@ INLINE struct quick_hit quick_face(const struct flat_face *face, const struct qu
     return h;
 }
 
-/* The nearest hits of the lanes that the quick form can tell, of the others anything; which these
- * are. */
+/* Nearest hits by the quick form. Returns the lanes that it could decide; *best is undefined in the
+ * others. */
 INLINE vi list_closest_quick(const struct small_scene *f, const struct rayv *q,
                              struct list_hits *best)
 {
@@ -231,7 +231,7 @@ INLINE vi list_closest_quick(const struct small_scene *f, const struct rayv *q,
     vi known = vf_lt(zero, sure) & vf_lt(q->tmin, low) & vf_lt(high, q->tmax) & vf_lt(high, second);
     known &= ~nothing;
     prim = vi_select(known, prim, vi_set(-1));
-    /* Distance and coordinates are those of the exact test. */
+    /* Distance and barycentric coordinates are recomputed by the exact test. */
     const vi is_x = vi_eq(q->axis, vi_set(0)), is_y = vi_eq(q->axis, vi_set(1));
     vi flat = vi_lt(prim, vi_set(f->num_triangles));
     int32_t number[LANES];
@@ -255,7 +255,7 @@ INLINE vi list_closest_quick(const struct small_scene *f, const struct rayv *q,
     return k.fit & vf_lt(worst, far) & (nothing | ball | (known & pass));
 }
 
-/* Lanes that meet something; *known: those of which the quick form can tell. */
+/* Lanes that are occluded; *known: lanes that the quick form could decide. */
 INLINE vi list_occluded_quick(const struct small_scene *f, const struct rayv *q, vi *known)
 {
     const struct quick k = quick_init(f, q);
@@ -280,14 +280,14 @@ INLINE vi list_occluded_quick(const struct small_scene *f, const struct rayv *q,
     return met;
 }
 
-/* Sheared rays. */
+/* Nearest hits in the list. The rays must be sheared (rayv_shear()). */
 INLINE void list_closest(const struct small_scene *f, const struct rayv *q, struct list_hits *best)
 {
     if (!f->quick || bits(list_closest_quick(f, q, best)) != ALL_LANES)
         list_closest_exact(f, q, best);
 }
 
-/* Lanes that meet something. The rays need not be sheared, and may be then. */
+/* Lanes that are occluded. The rays need not be sheared, and may be afterwards. */
 INLINE vi list_occluded(const struct small_scene *f, struct rayv *q)
 {
     vi known = vi_set(0), met = known;

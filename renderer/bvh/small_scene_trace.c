@@ -1,15 +1,15 @@
-/* The rays of a batch against a list, alone or beside a tree, compiled once for each instruction set. */
+/* Tests the rays of a batch against a list, alone or beside a tree; compiled once for each instruction set. */
 #include "small_scene_hit.h"
 #include "traverse.h"
 
-/* As many whatever the number of lanes. */
+/* Counts in groups of WIDTH rays, so that the count does not depend on LANES. */
 static void count(const struct wide *w, int num_lanes, struct bvh_stats *stats)
 {
     stats->primitive_tests +=
         (uint64_t)w->num_list_leaves * (((uint64_t)num_lanes + WIDTH - 1) / WIDTH);
 }
 
-/* Lanes of the mask that meet the tree's box, behind the num that are left; how many there are then. */
+/* Appends to left[], which has num entries, the lanes of the mask that meet the tree's box. Returns the new number. */
 INLINE int keep(const struct wide *w, struct rayv *q, const uint16_t *from, unsigned there,
                 uint16_t *left, int num)
 {

@@ -1,10 +1,10 @@
-/* The rays of a batch against a list, if there is one, and then the tree, compiled once for each instruction set. The
- * parts are headers, so that each loop is one piece to the compiler. */
+/* Tests the rays of a batch against the list, if there is one, and then against the tree; compiled once for each
+ * instruction set. Its parts are headers, so that the compiler sees each loop as a whole. */
 #include "traverse.h"
 #include "traverse_packet.h"
 #include "traverse_single.h"
 
-/* One batch: rays that are alike go in packets, the others one by one. h is NULL: occlusion. */
+/* Traces one batch: rays that are alike go in packets, the others one by one. h NULL: tests occlusion. */
 INLINE void trace(const struct wide *w, const struct rays *r, const uint16_t *lane, int num_lanes,
                   struct hits *h, bool *occluded, struct bvh_stats *stats)
 {

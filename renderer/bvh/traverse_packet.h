@@ -1,5 +1,5 @@
-/* Packet traversal, eight rays together: a leaf's primitives one by one against all of them, and
- * through the tree as one where they are alike. Part of traverse.c. */
+/* Packet traversal: eight rays that are alike go through the tree as one bundle; in a leaf, primitives
+ * are tested one by one against all of them. Part of traverse.c. */
 #ifndef ASSAY_TRAVERSE_PACKET_H
 #define ASSAY_TRAVERSE_PACKET_H
 
@@ -11,7 +11,7 @@
 struct packet {
     const struct rayv *q;
     int k[3];
-    vf limit, u, v; /* limit -infinity: the ray meets nothing any more */
+    vf limit, u, v; /* limit -infinity: the ray is finished */
     vi prim;
 };
 
@@ -27,8 +27,8 @@ INLINE void packet_init(const struct rayv *q, struct packet *p)
     p->prim = q->prim;
 }
 
-/* All primitives of a leaf against all rays. Shortens limit to the nearest; any: to -infinity for
- * whoever meets something that it does not ignore. True if a ray met something. */
+/* Tests all primitives of a leaf against all rays. Reduces limit to the nearest hit; any: to -infinity
+ * for each ray that hits something it does not ignore. True if a ray hit something. */
 INLINE bool packet_leaf(const struct wide_leaf *l, struct packet *p, bool spheres, bool any)
 {
     const struct rayv *q = p->q;
@@ -91,8 +91,8 @@ struct bundle {
     int row[3];
 };
 
-/* Are the rays alike enough to go together? One sign and one largest axis, directions within a few
- * degrees, origins within w->alike. */
+/* True if the rays are alike enough to go together: same signs and same largest axis of the
+ * directions, components within 0.1, origins within w->alike. */
 INLINE bool are_alike(const struct wide *w, const struct rayv *q)
 {
     vi alike = vi_eq(q->axis, vi_set(q->axis[0]));
@@ -121,7 +121,7 @@ static void bundle_init(const struct wide *w, const struct rayv *q, struct bundl
     b->tmin = vf_set(smallest(q->tmin));
 }
 
-/* Children that some ray of the bundle may meet, and a bound on where. */
+/* Mask of the children that some ray of the bundle may meet; *enter: lower bounds of the entries. */
 INLINE unsigned bundle_node(const struct wide_node *n, const struct bundle *b, vf limit, vf *enter)
 {
     vf t0 = b->tmin, t1 = limit;

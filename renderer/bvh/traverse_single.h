@@ -88,7 +88,7 @@ INLINE void single_keep_nearest(const struct wide_leaf *l, unsigned hit, vf t, v
     } while (hit);
 }
 
-/* A ray to the boxes, in registers. */
+/* A ray's data for the slab test, kept in registers. */
 struct slabs {
     vf inv[3], enter[3], leave[3], tmin;
     size_t row[3];
@@ -124,16 +124,16 @@ INLINE unsigned single_node(const struct wide_node *n, const struct slabs *b, vf
     return bits(vf_le(*enter, vf_min(vf_min(x1, y1), vf_min(z1, limit))));
 }
 
-/* The root: for all rays of an octet before any of them goes on, so that one does not wait for
- * another. */
+/* Tests the children of the root. Done for all eight rays before any of them goes on, so that none
+ * waits for another. */
 INLINE void single_root(const struct wide *w, struct single *s)
 {
     const struct slabs b = single_slabs(s);
     s->hit = single_node((const struct wide_node *)w->arena, &b, vf_set(s->limit), &s->enter);
 }
 
-/* From *ref down to a leaf, always to the nearest child; what is left goes onto the stack. False:
- * the ray meets no child of a node. */
+/* Descends from *ref to a leaf, always to the nearest child; pushes the other children hit. False: the
+ * ray meets no child of a node. */
 INLINE bool single_descend(const struct wide *w, const struct slabs *b, vf limit, uint32_t *ref,
                            stacked **top, uint64_t *nodes)
 {
@@ -149,7 +149,7 @@ INLINE bool single_descend(const struct wide *w, const struct slabs *b, vf limit
     return true;
 }
 
-/* A leaf. True: the ray need not go on. */
+/* Tests a leaf. True: the ray is finished, which only an occlusion test can be here. */
 INLINE bool single_visit(const struct wide *w, struct single *s, uint32_t ref, vf limit, bool any)
 {
     const struct wide_leaf *l = at(w, ref);
@@ -168,7 +168,7 @@ INLINE bool single_visit(const struct wide *w, struct single *s, uint32_t ref, v
     return true;
 }
 
-/* What waits and is near enough. False: nothing. */
+/* Pops into *ref the next entry that is not beyond the ray's limit. False if there is none. */
 INLINE bool single_pop(const struct single *s, bool any, const stacked *stack, stacked **top,
                        uint32_t *ref)
 {
@@ -181,7 +181,8 @@ INLINE bool single_pop(const struct single *s, bool any, const stacked *stack, s
     return true;
 }
 
-/* One ray from the root's children to its end; any: s->prim is NOTHING or not. */
+/* Takes one ray from the root's children to its end. any: s->prim then only tells, by not being NOTHING, that it is
+ * occluded. */
 INLINE void single_alone(const struct wide *w, struct single *s, bool any, struct bvh_stats *stats)
 {
     stats->box_tests++;
@@ -205,14 +206,14 @@ INLINE void single_alone(const struct wide *w, struct single *s, bool any, struc
     stats->primitive_tests += leaves;
 }
 
-/* A ray on its way: where it goes next, and what waits. */
+/* A ray on its way: the reference that is next, and its stack. */
 struct way {
     struct single *s;
     stacked *stack, *top;
     uint32_t ref;
 };
 
-/* One node or leaf. False: the ray is at its end. */
+/* Visits one node or leaf. False: the ray is finished. */
 INLINE bool way_step(const struct wide *w, struct way *on, bool any, uint64_t *nodes,
                      uint64_t *leaves)
 {
@@ -233,7 +234,7 @@ INLINE bool way_step(const struct wide *w, struct way *on, bool any, uint64_t *n
     return true;
 }
 
-/* The same of up to eight rays, each a step in its turn: while one waits for memory the others go on. */
+/* The same for up to eight rays, one step each in turn: while one waits for memory the others go on. */
 static __attribute__((noinline)) void single_in_turns(const struct wide *w, struct single *s, int n,
                                                       bool any, struct bvh_stats *stats)
 {

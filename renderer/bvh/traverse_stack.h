@@ -6,7 +6,7 @@
 #include "bvh_wide.h"
 #include "renderer/math/simd.h"
 
-/* A node leaves at most seven of its children behind; 64 free levels and 32 of halving. */
+/* A node pushes at most seven of its children; 64 free levels, 32 of halving and some to spare. */
 enum { STACK = 7 * 104 };
 
 /* A waiting node or leaf: the bits of the distance at which a ray enters it, and its reference. As
@@ -50,7 +50,7 @@ INLINE uint32_t stacked_ref(stacked s)
     return (uint32_t)s;
 }
 
-/* Without a branch: which of two is nearer cannot be predicted. */
+/* Branch-free: which of two is nearer cannot be predicted. */
 INLINE void order(stacked *near, stacked *far)
 {
     stacked a = *near, b = *far;
@@ -99,7 +99,7 @@ INLINE uint32_t push_sorted(const struct wide *w, const struct wide_node *n, uns
     return stacked_ref(near);
 }
 
-/* Of the children that are met the nearest; the others are pushed. ahead: all are fetched. */
+/* Returns the nearest of the children hit and pushes the others. ahead: prefetches them if there are several. */
 INLINE uint32_t next_of(const struct wide *w, const struct wide_node *n, unsigned hit, vf enter,
                         bool ahead, stacked **top)
 {

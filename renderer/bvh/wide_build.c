@@ -22,7 +22,7 @@ static bool is_sphere(const struct build *b, uint32_t item)
     return b->item[item].prim >= b->num_triangles;
 }
 
-/* A leaf is of triangles or of spheres. */
+/* A leaf has up to WIDTH triangles or up to WIDTH spheres. */
 static bool fits_leaf(const struct build *b, const struct wide_range *r)
 {
     if (r->count > WIDTH)
@@ -45,7 +45,7 @@ static uint32_t spheres_last(struct build *b, struct wide_range *r)
     return left;
 }
 
-/* Cuts r in two: what is left of it, and *right. */
+/* Cuts a range in two: *r becomes its left part. */
 static void cut(struct build *b, struct wide_range *r, struct wide_range *right)
 {
     const struct sah_split_passes *k = b->splitter;
@@ -70,7 +70,7 @@ static void cut(struct build *b, struct wide_range *r, struct wide_range *right)
     *r = l;
 }
 
-/* Room for so many more. */
+/* Makes room for `more` parts. False if out of memory. */
 static bool reserve(struct wide_build *p, size_t more)
 {
     if (p->num + more <= p->room)
@@ -87,13 +87,13 @@ static bool reserve(struct wide_build *p, size_t more)
     return true;
 }
 
-/* As a rule: two for each leaf, of six items or more. What is not used is no memory yet. */
+/* Usually enough: two parts per leaf, and six items or more in a leaf. Untouched pages take no memory. */
 static size_t most_parts(uint32_t items)
 {
     return items / 3 + 2;
 }
 
-/* The best ways to hang part i on 1 to 8 children, by those of its halves [Ylitie17]. */
+/* Fills part i's table of the best uses of 1 to 8 child slots, from those of its halves [Ylitie17]. */
 static void best_slots(struct build *b, uint32_t i)
 {
     struct wide_part *p = &b->parts->part[i];
@@ -143,7 +143,8 @@ static bool add_part(struct build *b, uint32_t i, struct wide_range *r)
     return true;
 }
 
-/* The parts that become children: those of part i, which has `slots` of them. */
+/* Appends to child[n ..] the parts that become children for part i, which may use `slots` slots. Returns the new
+ * number. */
 static int gather_children(const struct wide_build *p, uint32_t i, int slots, uint32_t *child,
                            int n)
 {
@@ -163,11 +164,11 @@ struct branch {
     struct wide_build parts;
 };
 
-/* Several threads: large ranges are cut one by one, smaller ones become branches. */
+/* State of a build on several threads: large ranges are cut one by one, smaller ones become branches. */
 struct grove {
     struct build *b;
-    pthread_mutex_t lock; /* of b->parts and of what follows */
-    uint32_t most;        /* items of a branch */
+    pthread_mutex_t lock; /* guards b->parts, branch, num, room */
+    uint32_t most;        /* largest branch, in items */
     struct branch *branch;
     size_t num, room;
 };
@@ -235,7 +236,7 @@ static int grow_range(void *ctx, const struct parallel_task *task, struct parall
     return ok ? 2 : -1;
 }
 
-/* The branches' parts behind those there are. */
+/* Appends the branches' parts to those of the whole, and frees the branches. False if out of memory. */
 static bool join_branches(struct grove *g)
 {
     struct wide_build *p = g->b->parts;
@@ -266,8 +267,7 @@ static bool grow_on_threads(struct build *b, const struct wide_range *all, int t
     bool ok = parallel_divide(threads, &first, grow_range, &g);
     pthread_mutex_destroy(&g.lock);
     size_t num_cut = b->parts->num;
-    /* Frees them one by one, or none of
-     * them if it fails. */
+    /* Frees all branches, or none of them if it fails. */
     ok = ok && join_branches(&g);
     for (size_t k = 0; !ok && k < g.num; k++)
         wide_build_free(&g.branch[k].parts);

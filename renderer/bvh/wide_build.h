@@ -1,5 +1,5 @@
-/* The binary tree that the wide one is made of, and which of its parts become the eight children of
- * each wide node. */
+/* The binary tree from which the wide one is made, and the choice of its parts that become the eight
+ * children of each wide node. */
 #ifndef ASSAY_WIDE_BUILD_H
 #define ASSAY_WIDE_BUILD_H
 
@@ -31,22 +31,22 @@ struct wide_build {
     size_t num, room;
 };
 
-/* Half the surface. */
+/* Half the surface area of a box. */
 static inline float wide_half_area(const struct wide_box *b)
 {
     float x = -b->v[4] - b->v[0], y = -b->v[5] - b->v[1], z = -b->v[6] - b->v[2];
     return x * y + y * z + z * x;
 }
 
-/* Cuts the items in `all` in two until each part is a leaf, of up to eight triangles or of up to eight
- * spheres (those from num_triangles on), by the surface area heuristic [Wald07], and chooses children
- * [Ylitie17]. More than eight items, so the root is no leaf; they are put in order of the parts. *p is
- * empty before; wide_build_free() afterwards. The same tree on any number of threads, though its parts may
- * have other numbers. False if out of memory. */
+/* Cuts the items in `all` in two, by the surface area heuristic [Wald07], until each part is a leaf of up
+ * to eight triangles or up to eight spheres (numbers from num_triangles on), and chooses the children of
+ * wide nodes [Ylitie17]. There must be more than eight items, so that the root is no leaf; they are put
+ * into the order of the leaves. *p must be empty; free it with wide_build_free(), in either case. The tree
+ * is the same on any number of threads, but its parts may be numbered otherwise. False if out of memory. */
 NODISCARD bool wide_build_make(const struct sah_split_passes *s, struct wide_item *item,
                                uint32_t num_triangles, const struct wide_range *all, int threads,
                                struct wide_build *p);
-/* The children of part i, not a leaf, as a node; how many. */
+/* The children of part i, which is no leaf, as a wide node. Returns how many. */
 int wide_build_children(const struct wide_build *p, uint32_t i, uint32_t child[WIDTH]);
 void wide_build_free(struct wide_build *p);
 

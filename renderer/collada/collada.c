@@ -9,14 +9,14 @@
 #include <string.h>
 #include <strings.h>
 
-/* What coordinates mean: of a document, or of an element with an <asset> of its own. */
+/* The meaning of coordinates in a document, or in an element with an <asset> of its own. */
 struct frame {
     const xmlDoc *doc;
     double unit; /* metres */
     int up;      /* index into AXES */
 };
 
-/* Where the walk is: one per level, so that a node that contains itself is seen. */
+/* Position of the walk over the nodes: one per level, so that a node that contains itself is detected. */
 struct place {
     const struct place *above;
     const xmlNode *node;
@@ -25,16 +25,16 @@ struct place {
     int depth;
 };
 
-/* To Y_UP, by the table of the specification. */
+/* Rotations to Y_UP, from the table in the specification. */
 static const char AXIS_NAMES[] = "Y_UP X_UP Z_UP";
 static const double AXES[][3][3] = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
                                     {{0, -1, 0}, {1, 0, 0}, {0, 0, 1}},
                                     {{1, 0, 0}, {0, 0, 1}, {0, -1, 0}}};
 
-/* The element's own <asset>, on top of what is in *f. */
+/* Updates *f by the element's own <asset>, if it has one. */
 static void read_asset(struct loader *ld, const xmlNode *element, struct frame *f)
 {
-    const xmlNode *asset = element_first(element); /* there, as the survey has seen */
+    const xmlNode *asset = element_first(element); /* an <asset> is first: survey_element() */
     if (!element_is(asset, "asset"))
         return;
     const xmlNode *unit = element_child(asset, "unit"), *up = element_child(asset, "up_axis");
@@ -51,7 +51,7 @@ static void read_asset(struct loader *ld, const xmlNode *element, struct frame *
     f->up = field_choice(ld, asset, "up_axis", AXIS_NAMES, f->up);
 }
 
-/* Takes coordinates from one frame to another, lengths times `size`. */
+/* The matrix that takes coordinates from one up axis to another and scales lengths by `size`. */
 static mat4 change_axes(int from, int to, double size)
 {
     mat4 m = mat4_identity();
@@ -76,7 +76,7 @@ static struct frame home_of(struct loader *ld, const xmlNode *element, const str
     return home;
 }
 
-/* From the frame outside to that of an element; the change takes coordinates from there to outside. */
+/* Sets *inside to the frame of an element in the frame `outside`; returns the matrix from inside to outside. */
 static mat4 enter(struct loader *ld, const xmlNode *element, const struct frame *outside,
                   struct frame *inside)
 {
@@ -101,7 +101,7 @@ static mat4 make_lookat(struct loader *ld, const xmlNode *n, const double *v)
     return mat4_columns(right, d3_cross(backward, right), backward, eye);
 }
 
-/* Points move along the second axis by the tangent of the angle times how far they are along the
+/* Points move along the second axis by the tangent of the angle times their coordinate along the
  * first. */
 static mat4 make_skew(struct loader *ld, const xmlNode *n, const double *v)
 {
@@ -133,7 +133,7 @@ static mat4 make_matrix(struct loader *ld, const xmlNode *n, const double *v)
     return m;
 }
 
-/* The element's matrix, which is the identity for what is no transform. */
+/* The element's matrix; the identity if it is not a transform. */
 static mat4 read_transform(struct loader *ld, const xmlNode *n)
 {
     enum { LOOKAT, MATRIX, ROTATE, SCALE, SKEW, TRANSLATE };
@@ -161,7 +161,7 @@ static const char *name_of(const xmlNode *node)
     return name != NULL ? name : id != NULL ? id : "node";
 }
 
-/* The triangles of a mesh's group through a transform. */
+/* Adds the triangles of a mesh group, transformed, as an object. */
 static void add_group(struct loader *ld, const xmlNode *instance, const struct mesh *mesh,
                       const struct mesh_group *group, const mat4 *to_world, const char *name)
 {
@@ -218,7 +218,7 @@ static void instance_node(struct loader *ld, const xmlNode *instance, const stru
         walk(ld, node, at);
 }
 
-/* <instance_light> or <instance_camera>. */
+/* Adds an <instance_light> or <instance_camera>. */
 static void instance_light_or_camera(struct loader *ld, const xmlNode *c, const struct place *at)
 {
     bool is_light = element_is(c, "instance_light");
@@ -305,8 +305,8 @@ static void write_notes(struct loader *ld)
         add_note(ld, "specular terms are left out, as the assignment does");
 }
 
-/* What moves is counted, as a still image shows where it stands; other libraries may only be empty,
- * as exporters leave them. */
+/* Counts what is animated, which a still image shows in its rest position. Any other library must be
+ * empty, as exporters leave them. */
 static void check_libraries(struct loader *ld, const xmlNode *root)
 {
     static const char SHOWN[] = "asset scene extra library_cameras library_lights library_images "
@@ -329,7 +329,7 @@ static void check_libraries(struct loader *ld, const xmlNode *root)
     }
 }
 
-/* Of a file that shows none: its only one, NULL if there is none. */
+/* For a file without <scene>: its only <visual_scene>, NULL if it has none. Fails if it has several. */
 static const xmlNode *find_only_visual_scene(struct loader *ld, const xmlNode *root)
 {
     const xmlNode *only = NULL;
@@ -368,7 +368,7 @@ static bool read_scene(struct loader *ld, const xmlNode *root)
     const xmlNode *visual = find_visual_scene(ld, root);
     element_check(ld, visual, "asset? node* extra*");
     top.to_world = enter(ld, visual, &world, &top.frame);
-    /* Other documents than those of Y_UP are turned, too, as the assignment turns them. */
+    /* A document that is not Y_UP is also turned by 180 degrees about y, as in the assignment. */
     if (top.frame.up != 0)
         for (int j = 0; j < 3; j++) {
             top.to_world.m[0][j] = -top.to_world.m[0][j];
@@ -391,7 +391,7 @@ static bool read_scene(struct loader *ld, const xmlNode *root)
         return scene_finish(&ld->scene, ld->path, ld->err);
     if (!ld->scene.camera.present)
         camera_default(ld);
-    /* The assignment frames its objects, among them a mesh that gives way to its lamp. */
+    /* The assignment frames all its objects, including a mesh that is dropped below for its area light. */
     vec3 lo, hi;
     bool has_frame = build_find_bounds(ld, false, &lo, &hi);
     build_drop_twin_lamps(ld);
@@ -404,7 +404,7 @@ static bool read_scene(struct loader *ld, const xmlNode *root)
     return true;
 }
 
-/* Takes the file, which is of that path or of a text in memory. */
+/* Loads the open file, of that path or of a text in memory, and closes it. */
 static bool load(FILE *file, bool is_file, const char *path, enum dialect dialect,
                  struct scene *out, struct err *e)
 {
@@ -438,7 +438,7 @@ bool collada_parse(const char *text, size_t size, const char *path, enum dialect
                         : err_set(e, "%s: out of memory", path);
 }
 
-/* What people try first, by its ending. */
+/* Formats that people try first, told by the ending of the name. */
 static bool is_other_format(const char *path)
 {
     static const char *const ENDINGS[] = {".obj",  ".gltf", ".glb", ".usd", ".usda",

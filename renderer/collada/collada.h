@@ -12,8 +12,8 @@
 NODISCARD bool collada_load(const char *path, enum dialect dialect, struct scene *out,
                             struct err *e);
 
-/* The same for a document of at most `size` bytes in memory, ended by the first zero. It may not refer to other files;
- * path is its name in error lines, and its images lie beside that. */
+/* The same for a document of `size` bytes in memory, or up to its first zero. It must not refer to other documents.
+ * path: its name in error lines; images are looked for beside it. */
 NODISCARD bool collada_parse(const char *text, size_t size, const char *path, enum dialect dialect,
                              struct scene *out, struct err *e);
 

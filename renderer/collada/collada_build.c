@@ -150,7 +150,7 @@ void build_add_triangle(struct loader *ld, const xmlNode *n, const mat4 *m, doub
     o->num_triangles++;
 }
 
-/* The one factor by which m scales all lengths; 0 if there is none. */
+/* The factor by which m scales all lengths; 0 if directions differ. */
 static double uniform_scale(const mat4 *m)
 {
     dvec3 a[3] = {mat4_column(m, 0), mat4_column(m, 1), mat4_column(m, 2)};
@@ -204,7 +204,7 @@ bool build_find_bounds(const struct loader *ld, bool with_lamps, vec3 *lo, vec3 
     return lo->x <= hi->x;
 }
 
-/* Area and centre of area of an object's triangles. */
+/* Area (returned) and centroid of an object's triangles. */
 static float surface_centre(const struct scene *s, const struct object *o, vec3 *centre)
 {
     vec3 sum = v3(0, 0, 0);
@@ -219,9 +219,9 @@ static float surface_centre(const struct scene *s, const struct object *o, vec3 
     return area;
 }
 
-/* Do they lie in one plane, with one centre (both within `reach`), and differ less than twofold in
- * area? In the assignment's scenes the two rectangles are turned against each other by 90 degrees,
- * so outlines cannot be compared. */
+/* True if they lie in one plane and have the same centroid (both within `reach`), and their areas
+ * differ by less than a factor of 2. In the assignment's scenes the two rectangles are turned against
+ * each other by 90 degrees, so outlines cannot be compared. */
 static bool are_twins(const struct scene *s, const struct object *lamp, const struct object *mesh,
                       float reach)
 {
@@ -238,14 +238,14 @@ static bool are_twins(const struct scene *s, const struct object *lamp, const st
     return true;
 }
 
-/* Takes `gone` elements from the middle of an array of `count`. */
+/* Removes `gone` elements, from `first` on, from an array of `count`. */
 static void cut_out(void *array, size_t size, size_t first, size_t gone, size_t count)
 {
     char *at = (char *)array + first * size;
     memmove(at, at + gone * size, (count - first - gone) * size);
 }
 
-/* Takes an object that has triangles only out of the scene. */
+/* Removes object i, which must have triangles only, from the scene. */
 static void remove_object(struct loader *ld, uint32_t i)
 {
     struct scene *s = &ld->scene;

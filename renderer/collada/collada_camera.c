@@ -1,7 +1,7 @@
 /* <camera> as it is instanced. */
 #include "collada_internal.h"
 
-/* In metres. */
+/* A length in metres; 0 if the element is missing. */
 static float read_length(struct loader *ld, const xmlNode *n, const char *name)
 {
     double v = ld->unit * field_number(ld, n, name, 0, ANY_LENGTH);
@@ -30,7 +30,7 @@ static void read_kind(struct loader *ld, const xmlNode *n, struct scene_camera *
         fail_at(ld, n, "<orthographic> needs <xmag> or <ymag>");
     if (is_flat)
         return;
-    /* Blender writes the angle of the larger side for <xfov>, unless told which is meant. */
+    /* Blender writes the angle of the larger side as <xfov>, unless its sensor fit is set. */
     ld->num_left_out[LEFT_OUT_UPRIGHT] +=
         ld->blender_version > 0 && ld->dialect == DIALECT_COLLADA && c->aspect > 0 && c->aspect < 1;
     if (ld->dialect == DIALECT_CGL) {

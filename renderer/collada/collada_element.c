@@ -73,14 +73,14 @@ bool element_is(const xmlNode *n, const char *name)
     return n != NULL && strcmp((const char *)n->name, name) == 0 && has_our_namespace(n);
 }
 
-/* A word of a list as element_check() has it. */
+/* A word of a list in the syntax of element_check(). */
 struct word {
     const char *names; /* between bars */
     int length;
     char how_many; /* '?', '*', or else one */
 };
 
-/* The next of a list, which is taken from it. False at the end. */
+/* Takes the next word from a list. False at the end. */
 static bool next_word(const char **list, struct word *w)
 {
     *list += strspn(*list, " ");

@@ -5,8 +5,8 @@
 
 #include <string.h>
 
-/* The assignment's emitter shines to both sides; ours adds to the reflection of profile_COMMON, which is in *m
- * already. */
+/* The assignment's emitter emits to both sides and reflects nothing; ours keeps the reflection of profile_COMMON, which
+ * is already in *m. */
 static void read_emission(struct loader *ld, const xmlNode *tag, bool is_cgl, struct material *m)
 {
     if (!is_cgl && !rgb_is_zero(m->radiance))
@@ -23,8 +23,8 @@ static void read_mirror(struct loader *ld, const xmlNode *tag, struct material *
     m->reflectance = field_color(ld, tag, "reflectance", 1);
 }
 
-/* <glass> or <refraction>, smooth only. The assignment's files carry a <roughness> that nothing uses; another than 0
- * would mean something. */
+/* <glass> or <refraction>, smooth only. The assignment's files carry a <roughness> that nothing uses; other values than
+ * 0 are refused. */
 static void read_dielectric(struct loader *ld, const xmlNode *tag, struct material *m)
 {
     bool is_glass = element_is(tag, "glass");
@@ -38,7 +38,7 @@ static void read_dielectric(struct loader *ld, const xmlNode *tag, struct materi
     field_number(ld, tag, "roughness", 0, 0, 0);
 }
 
-/* The assignment's conductor: Beckmann, heights correlated, Fresnel by eta and k. */
+/* Rough metal. The assignment's: Beckmann, height-correlated shadowing, Fresnel by eta and k. */
 static void read_microfacet(struct loader *ld, const xmlNode *tag, bool is_cgl, struct material *m)
 {
     m->conductor = is_cgl || element_child(tag, "reflectance") == NULL;
@@ -63,7 +63,7 @@ void extra_read_material(struct loader *ld, const xmlNode *technique, struct mat
     const xmlNode *tag = element_first(technique);
     if (!element_check(ld, technique, "emission|mirror|glass|refraction|microfacet"))
         return;
-    if (is_cgl || !element_is(tag, "emission")) { /* which takes the place of what reflects */
+    if (is_cgl || !element_is(tag, "emission")) { /* replaces what reflects */
         m->kind = MATERIAL_DIFFUSE;
         m->reflectance = m->specular = m->mirror = grey(0);
         m->reflectance_map = 0;

@@ -1,4 +1,4 @@
-/* Child elements of one value each, which element_check() has seen. */
+/* Values of child elements whose number element_check() has checked. */
 #include "collada_internal.h"
 
 double field_number(struct loader *ld, const xmlNode *n, const char *name, double missing,

@@ -2,9 +2,10 @@
  * below its name: XML (collada_xml.c, collada_element.c, ..), the parts of a document
  * (collada_mesh.c, ..), and the growing scene (collada_build.c).
  *
- * The first failure puts "path:line: what" into loader.err and sets loader.failed; later ones change nothing. Readers go
- * on with zeros, black and NULL, which the functions of collada_element.c take for an element, and look at `failed` before
- * they loop for long, write to an array or follow a pointer. Those of type bool return !failed. */
+ * The first failure puts "path:line: what" into loader.err and sets loader.failed; later ones change nothing. After a
+ * failure readers go on with zeros, black and NULL (the functions of collada_element.c accept NULL as an element), and
+ * check `failed` before they loop for long, write to an array or follow a pointer. Those of type bool return !failed.
+ */
 #ifndef ASSAY_COLLADA_INTERNAL_H
 #define ASSAY_COLLADA_INTERNAL_H
 
@@ -30,7 +31,7 @@ enum {
     MAX_UV_SETS = 8 /* of one primitive */
 };
 
-/* By build_grow(). */
+/* Arrays grown by build_grow(). */
 struct doubles {
     double *data;
     size_t count;
@@ -45,7 +46,7 @@ struct uints {
 struct corner {
     dvec3 position;
     vec3 normal;
-    uint32_t uv; /* where the group's sets of texture coordinates begin in the mesh */
+    uint32_t uv; /* index in mesh.uv of the first of its group's num_uv coordinates */
 };
 
 /* One <polylist>, <triangles> or <polygons>. */
@@ -74,10 +75,10 @@ struct mesh {
 struct material_slot {
     const xmlNode *node; /* <material>; NULL: the grey of CGL */
     uint32_t index;
-    const char *texcoord; /* what its textures are looked up by */
+    const char *texcoord; /* semantic of its textures' coordinates */
 };
 
-/* What is in a file and not in a still image of surfaces: counted for the note. */
+/* What the scene leaves out of a file, or changes: counted for the scene's note. */
 enum left_out {
     LEFT_OUT_MOVING,
     LEFT_OUT_LINES,
@@ -90,23 +91,23 @@ enum left_out {
     LEFT_OUT_UPRIGHT,
     NUM_LEFT_OUT
 };
-#define NO_SURFACE UINT32_MAX /* a material that lets everything through */
+#define NO_SURFACE UINT32_MAX /* the material of a wholly transparent surface */
 
 /* A file that is read: the scene's own first, then those that it refers to. */
 struct document {
     const char *path;
-    bool is_file;      /* so that others can be beside it */
+    bool is_file;      /* references to files beside it work */
     xmlDoc *doc;       /* whose _private is this */
-    xmlHashTable *ids; /* to the element; to this document where more than one has the id */
+    xmlHashTable *ids; /* id to element, or to this document if several have it */
 };
 
 struct loader {
-    const char *path; /* of the scene; of the document that is parsed */
-    FILE *file;       /* that is parsed */
+    const char *path; /* of the scene; while parsing, of the document */
+    FILE *file;       /* being parsed */
     struct err *err;
     bool failed;
     enum dialect dialect;
-    double blender_version; /* that wrote the scene; 0: another program */
+    double blender_version; /* of the writer; 0: another program */
     bool is_course_export;  /* taken for a file of the assignment by the program that wrote it */
     unsigned num_specular;  /* materials in use whose highlight the dialect leaves out */
     unsigned num_left_out[NUM_LEFT_OUT];
@@ -119,7 +120,7 @@ struct loader {
     size_t num_meshes;
     struct material_slot *slots;
     size_t num_slots;
-    bool has_textures;    /* somewhere: texture coordinates are read */
+    bool has_textures;    /* possibly: texture coordinates are read */
     const char *texcoord; /* of the material that is being read */
     bool *is_lamp;        /* per object: it came from a light element */
     size_t num_nodes;
@@ -137,7 +138,7 @@ const struct document *xml_open(struct loader *ld, const char *path, FILE *file,
 
 /* Sets the line "path:line: ...", unless one is set. Always false. */
 #define fail_at(ld, n, ...) element_fail_line(ld, n, element_line(n), __VA_ARGS__)
-/* n: of the document that is meant; NULL: ld->path. line 0: of no line. */
+/* n: any element of the document to be named; NULL: names ld->path. line 0: no line number. */
 bool element_fail_line(struct loader *ld, const xmlNode *n, long line, const char *fmt, ...)
     __attribute__((format(printf, 4, 5)));
 bool element_fail_memory(struct loader *ld);
@@ -151,57 +152,57 @@ const xmlNode *element_first(const xmlNode *n);
 const xmlNode *element_next(const xmlNode *n);
 /* First child element of that name or NULL. */
 const xmlNode *element_child(const xmlNode *n, const char *name);
-/* The first whose attribute has that value; NULL: none. */
+/* The first child of that name whose attribute has that value; NULL if there is none. */
 const xmlNode *element_child_with(const xmlNode *n, const char *name, const char *attribute,
                                   const char *value);
-/* Is it the COLLADA element of that name? */
+/* True if n is the COLLADA element of that name. */
 bool element_is(const xmlNode *n, const char *name);
-/* Which of the words, separated by blanks, it is; -1: none. */
+/* Index of `name` among words separated by blanks (A|B: either; "*": any name); -1: none. */
 int element_place_among(const char *name, const char *words);
-/* Is its name one of the words? */
+/* True if the COLLADA element n has one of these names. */
 bool element_is_one_of(const xmlNode *n, const char *words);
 /* Fails unless the children of n match `words`, blanks between, in any order: NAME, one; NAME?, at most one; NAME*, any
  * number; A|B, one of either name; *, whatever else. */
 bool element_check(struct loader *ld, const xmlNode *n, const char *words);
 /* The attribute's value or NULL; lives in the document. */
 const char *element_attribute(const xmlNode *n, const char *name);
-/* The same of one that must be there. */
+/* The same; fails, and returns "", if it is missing. */
 const char *element_needed_attribute(struct loader *ld, const xmlNode *n, const char *name);
-/* An unsigned attribute that must be there; one that may be missing. */
+/* Value of an unsigned attribute below 2^32-1: required, or `missing` if it is not there. */
 uint64_t element_count(struct loader *ld, const xmlNode *n, const char *name);
 uint64_t element_count_or(struct loader *ld, const xmlNode *n, const char *name, uint64_t missing);
-/* Is it "ASSAY" or "CGL"? */
+/* True for "ASSAY" and "CGL". */
 bool element_is_own_profile(const char *profile);
 /* The profile="ASSAY" or profile="CGL" technique in the element's <extra>s, NULL if none. */
 const xmlNode *element_own_technique(struct loader *ld, const xmlNode *n);
 
 /* collada_text.c */
 
-/* The element's text as finite numbers, appended. */
+/* Appends the element's text, as finite numbers or as indices, to *out. */
 bool text_read_doubles(struct loader *ld, const xmlNode *n, struct doubles *out);
 bool text_read_uints(struct loader *ld, const xmlNode *n, struct uints *out);
-/* Between least and most numbers, and how many there were; the missing ones, and all after a failure, are 0. */
+/* Reads `least` to `most` numbers into out[] and returns how many. Missing ones, and all after a failure, are 0. */
 size_t text_read_numbers(struct loader *ld, const xmlNode *n, double *out, size_t least,
                          size_t most);
-/* A non-negative colour, black after a failure; alpha (may be NULL) is 1 where there are only three numbers. */
+/* A non-negative colour, black after a failure; *alpha (alpha may be NULL) is 1 if there are only three numbers. */
 rgb text_read_color(struct loader *ld, const xmlNode *n, double *alpha);
 /* The element's text without blanks around it; lives in the document. */
 const char *text_read_word(struct loader *ld, const xmlNode *n);
 
-/* collada_field.c: what the only child of n of that name says. */
+/* collada_field.c: the value of n's only child of that name. */
 
 #define ANY_NUMBER -DBL_MAX, DBL_MAX
 #define ANY_LENGTH 1e-300, 1e300
-/* From lo to hi. */
+/* A number from lo to hi; `missing` if there is no such child. */
 double field_number(struct loader *ld, const xmlNode *n, const char *name, double missing,
                     double lo, double hi);
-/* Black if missing; no part above `most`. */
+/* A colour without a channel above `most`; black if there is no such child. */
 rgb field_color(struct loader *ld, const xmlNode *n, const char *name, float most);
-/* The place of the text among words that blanks separate. */
+/* Index of the text among words separated by blanks; `missing` if there is no such child. */
 int field_choice(struct loader *ld, const xmlNode *n, const char *name, const char *words,
                  int missing);
 
-/* collada_reference.c: NULL is a failure. */
+/* collada_reference.c: both return NULL after a failure. */
 
 /* The `element` with that id in the document of n, whose line an error names. */
 const xmlNode *reference_find(struct loader *ld, const xmlNode *n, const char *id,
@@ -228,25 +229,25 @@ struct texture_use parameter_get_texture(struct loader *ld, const xmlNode *textu
 
 /* collada_texture.c */
 
-/* The map of a <texture>, its image read if it has not been; *texcoord: what it is looked up by. */
+/* The map (struct material) of a <texture>; reads its image at first use. *texcoord: semantic of its coordinates. */
 uint32_t texture_get(struct loader *ld, const xmlNode *texture, const char **texcoord);
-/* Which set of a group that name stands for in an <instance_geometry>, by its <instance_material>;
- * group NULL: a sphere. */
+/* Index of the group's set of texture coordinates that `texcoord` stands for in an <instance_geometry>,
+ * by its <instance_material> `binding`. group NULL: a sphere. */
 size_t texture_find_set(struct loader *ld, const xmlNode *instance, const xmlNode *binding,
                         const char *texcoord, const struct mesh_group *group);
 
 /* collada_extra.c */
 
-/* Our or the assignment's material tag in a technique of theirs, on top of what profile_COMMON has
- * put into *m. */
+/* Reads our or the assignment's material tag from a technique of that profile into *m, which already
+ * holds what profile_COMMON says. */
 void extra_read_material(struct loader *ld, const xmlNode *technique, struct material *m);
 
 /* collada_build.c */
 
 void *build_grow_now(struct loader *ld, void *data, size_t size, size_t count);
-/* `data`, which has `count` elements of that size and grew by this function only, with room for one more: moved or as it
- * was; always the latter after failure. Look at ld->failed before you write. There is room for 8, then for the next power
- * of two. */
+/* Makes room for one more element in `data`, which has `count` elements of `size` bytes and was grown by this function
+ * only. Returns the array, which may have moved; after a failure the old one, so check ld->failed before writing. The
+ * capacity is 8, then the next power of two. */
 static inline void *build_grow(struct loader *ld, void *data, size_t size, size_t count)
 {
     bool has_room = count < 8 ? count != 0 : (count & (count - 1)) != 0;
@@ -254,15 +255,15 @@ static inline void *build_grow(struct loader *ld, void *data, size_t size, size_
 }
 /* Copies a name: at most size-1 bytes, whole UTF-8 characters, no control characters. */
 void build_copy_name(char *out, size_t size, const char *name);
-/* Its index. */
+/* Returns the material's index. */
 uint32_t build_add_material(struct loader *ld, const struct material *m);
 void build_add_light(struct loader *ld, const struct light *l);
 vec3 build_to_float(dvec3 v);
-/* In world space. Fails, naming n and `what`, if beyond FARTHEST. */
+/* p transformed to world space. Fails, naming n and `what`, if it is beyond FARTHEST. */
 vec3 build_place(struct loader *ld, const xmlNode *n, const char *what, const mat4 *m, dvec3 p);
-/* A unit vector along v, of n. */
+/* The unit vector along v. Fails, naming n, if v has no length. */
 vec3 build_direction(struct loader *ld, const xmlNode *n, dvec3 v);
-/* A new object that the following triangles and spheres belong to. */
+/* Begins an object, to which the following triangles and spheres belong. */
 void build_begin_object(struct loader *ld, const char *name, const char *symbol, uint32_t material,
                         bool is_lamp);
 /* Adds a triangle to the object begun last, by the transform m, whose determinant has that sign.
@@ -275,7 +276,7 @@ void build_add_sphere(struct loader *ld, const xmlNode *n, const mat4 *m, double
 double build_transform_sign(struct loader *ld, const xmlNode *n, const mat4 *m);
 /* Bounds of all primitives, with or without those of light elements. False if there are none. */
 bool build_find_bounds(const struct loader *ld, bool with_lamps, vec3 *lo, vec3 *hi);
-/* CGL: emissive meshes that show the same lamp as an area light are taken out. */
+/* CGL: removes emissive meshes that show the same lamp as an area light. */
 void build_drop_twin_lamps(struct loader *ld);
 
 /* collada_source.c */
@@ -285,7 +286,7 @@ struct source {
     const xmlNode *node;
     struct doubles array;
     uint64_t count;
-    unsigned wanted, size; /* numbers of each: z of points in a plane is not there */
+    unsigned wanted, size; /* numbers per element: asked for; present (2 for points in a plane) */
 };
 
 /* Sources of one mesh are parsed once, however many primitives share them. */
@@ -294,11 +295,11 @@ struct sources {
     size_t count;
 };
 
-/* The inputs of one primitive that are read. */
+/* Those inputs of one primitive that are read. */
 struct inputs {
     uint64_t stride; /* numbers per corner */
     struct input {
-        bool present, by_vertex; /* by_vertex: its index is the vertex's */
+        bool present, by_vertex; /* by_vertex: indexed like the vertex */
         uint64_t offset;
         size_t source; /* index into `sources` */
         uint64_t set;
@@ -316,21 +317,21 @@ void mesh_release(struct mesh *m);
 
 /* collada_material.c */
 
-/* The material bound to `symbol` (NULL: the only one) by an <instance_geometry>, or NO_SURFACE; which
- * of the group's sets of texture coordinates it means, if it has textures. group NULL: a sphere. */
+/* The material bound to `symbol` (NULL: the only one) by an <instance_geometry>, or NO_SURFACE. *uv_set:
+ * the group's set of texture coordinates that it uses, if it has textures. group NULL: a sphere. */
 uint32_t material_get(struct loader *ld, const xmlNode *instance, const xmlNode *user,
                       const char *symbol, const struct mesh_group *group, size_t *uv_set);
 
 /* collada_light.c */
 void light_instance(struct loader *ld, const xmlNode *instance, const xmlNode *light,
                     const char *node_name, const mat4 *m);
-/* What all ambient lights give together becomes the environment. */
+/* Makes the environment from the sum of all ambient lights. */
 void light_finish(struct loader *ld);
 
 /* collada_camera.c */
 void camera_instance(struct loader *ld, const xmlNode *instance, const xmlNode *camera,
                      const char *node_name, const mat4 *m);
-/* What the assignment uses for a file without a camera. */
+/* Sets the camera that the assignment uses for a file without one. */
 void camera_default(struct loader *ld);
 
 #endif

@@ -5,8 +5,8 @@
 #include <float.h>
 #include <string.h>
 
-/* The attenuation over metres. Pure inverse-square falloff is brought to the physical form {0, 0, 1},
- * where the value is an intensity. */
+/* Reads the attenuation, for distances in metres. A pure inverse-square falloff is brought to the physical
+ * form {0, 0, 1}, in which the value is a radiant intensity. */
 static void read_attenuation(struct loader *ld, const xmlNode *n, struct light *l)
 {
     double a[3] = {field_number(ld, n, "constant_attenuation", 1, 0, 1e300),
@@ -49,8 +49,8 @@ static void add_point(struct loader *ld, const xmlNode *n, const mat4 *m)
     build_add_light(ld, &l);
 }
 
-/* It shines along its -Z. The assignment takes the point (0,0,-1) with the translation for the
- * direction towards the light. */
+/* It shines along its -Z. The assignment transforms (0,0,-1) as a point, with the translation, and
+ * takes the result as the direction towards the light. */
 static void add_directional(struct loader *ld, const xmlNode *n, const mat4 *m)
 {
     element_check(ld, n, "color");
@@ -60,8 +60,8 @@ static void add_directional(struct loader *ld, const xmlNode *n, const mat4 *m)
                                         .to_light = build_direction(ld, n, to_light)});
 }
 
-/* A rectangle that emits to its -Z side is geometry: so what light sampling aims at and what a ray
- * hits are the same thing. */
+/* Adds a rectangle that emits to its -Z side, as geometry, so that light sampling and rays find the
+ * same thing. */
 static void add_lamp(struct loader *ld, const xmlNode *n, const char *name, const mat4 *m,
                      double width, double height, rgb radiance)
 {
@@ -110,7 +110,8 @@ void light_finish(struct loader *ld)
         element_fail_memory(ld);
 }
 
-/* What Blender's exporter wrote beside, from 2.80 on, of a light that is as it wrote it; else NULL. */
+/* The technique that Blender's exporter adds to a light from 2.80 on; NULL if there is none or the light's falloff was
+ * edited. */
 static const xmlNode *blender_technique(const struct loader *ld, const xmlNode *light,
                                         const xmlNode *kind)
 {
@@ -123,9 +124,9 @@ static const xmlNode *blender_technique(const struct loader *ld, const xmlNode *
     return is_its && ld->blender_version >= 2.8 && ld->dialect == DIALECT_COLLADA ? t : NULL;
 }
 
-/* Blender's exporter writes colour times watts as if they were an intensity, with a falloff that no
- * renderer of Blender's has, and an area light as a point. Of the light added last, which is a point
- * or a spot, to what Cycles takes it for. */
+/* Blender's exporter writes colour times watts as if that were an intensity, with a falloff that no
+ * renderer of Blender's has, and an area light as a point. Turns the light added last, a point or a
+ * spot, into what Cycles would make of it. */
 static void mean_blender(struct loader *ld, const xmlNode *technique, const char *name,
                          const mat4 *m)
 {

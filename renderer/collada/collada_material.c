@@ -4,7 +4,7 @@
 
 #include <string.h>
 
-/* What a channel of a shader says, itself or by a parameter; a line for a texture. NULL: nothing. */
+/* The value of a shader's channel, given directly or by a parameter; fails on a texture. NULL: no value. */
 static const xmlNode *find_value(struct loader *ld, const xmlNode *shader, const char *name,
                                  bool is_color)
 {
@@ -23,7 +23,7 @@ static const xmlNode *find_value(struct loader *ld, const xmlNode *shader, const
     return value;
 }
 
-/* One channel of a shader: a missing element leaves *alpha as it is. */
+/* Colour of a shader's channel, `missing` if it is not there, which leaves *alpha as it is. */
 static rgb read_channel(struct loader *ld, const xmlNode *shader, const char *name, rgb missing,
                         double *alpha)
 {
@@ -31,7 +31,7 @@ static rgb read_channel(struct loader *ld, const xmlNode *shader, const char *na
     return color != NULL ? text_read_color(ld, color, alpha) : missing;
 }
 
-/* The same, or a <texture>: then white. */
+/* The same, but accepts a <texture>: the colour is then white, and *map is set. */
 static rgb read_mapped_channel(struct loader *ld, const xmlNode *shader, const char *name,
                                rgb missing, uint32_t *map)
 {
@@ -56,7 +56,7 @@ static double read_factor(struct loader *ld, const xmlNode *shader, const char *
     return missing;
 }
 
-/* COLLADA 1.5 "Determining Transparency (Opacity)": all of the light passes, or none. */
+/* COLLADA 1.5 "Determining Transparency (Opacity)": true if all light passes; fails unless all or none does. */
 static bool is_transparent(struct loader *ld, const xmlNode *shader)
 {
     const xmlNode *transparent = element_child(shader, "transparent"),
@@ -78,7 +78,7 @@ static bool is_transparent(struct loader *ld, const xmlNode *shader)
     return most == 1 - opaque;
 }
 
-/* No channel of the three together is to be above 1. */
+/* Scales diffuse, specular and mirror so that no channel of their sum exceeds 1. */
 static void darken(struct loader *ld, struct material *m)
 {
     rgb *const part[] = {&m->reflectance, &m->specular, &m->mirror};
@@ -94,8 +94,8 @@ static void darken(struct loader *ld, struct material *m)
     ld->num_left_out[LEFT_OUT_BRIGHT]++;
 }
 
-/* The highlight of Blinn's (n.h)^shininess is as wide as Beckmann's of alpha^2 = 2/(shininess + 2) [Walter07 5.2],
- * that of Phong's (r.v)^shininess as Blinn's of four times the exponent: r turns twice as fast as h. */
+/* Reads highlight and mirror image. Blinn's (n.h)^shininess is as wide as Beckmann's of alpha^2 = 2/(shininess + 2)
+ * [Walter07 5.2], Phong's (r.v)^shininess as Blinn's with four times the exponent, since r turns twice as fast as h. */
 static void read_highlight(struct loader *ld, const xmlNode *shader, struct material *m)
 {
     const double shininess = read_factor(ld, shader, "shininess", 0),
@@ -121,7 +121,7 @@ static void read_highlight(struct loader *ld, const xmlNode *shader, struct mate
     m->specular = m->mirror = grey(0);
 }
 
-/* What the assignment does not look at may be anything; only for the note. */
+/* Only for the note: the assignment ignores <specular>, so an invalid one is no error. */
 static bool has_highlight(const struct loader *ld, const xmlNode *shader)
 {
     struct loader quiet = *ld;
@@ -175,7 +175,7 @@ static void read_effect(struct loader *ld, const xmlNode *effect, struct materia
     const xmlNode *technique = element_own_technique(ld, effect),
                   *common = element_child(effect, "profile_COMMON");
     bool is_cgl = technique != NULL && strcmp(element_attribute(technique, "profile"), "CGL") == 0;
-    if (common == NULL && technique == NULL) /* of shaders alone: as no material */
+    if (common == NULL && technique == NULL) /* only shader code: as without material */
         ld->num_left_out[LEFT_OUT_MATERIAL] += ld->dialect == DIALECT_COLLADA;
     if (!is_cgl && common != NULL)
         read_common(ld, common, m);
@@ -200,7 +200,8 @@ static void read_material(struct loader *ld, const xmlNode *material, struct mat
         read_effect(ld, effect, m);
 }
 
-/* material NULL: what the assignment, or else Blender, takes for a surface without material. */
+/* The slot of a material, which is read at the first call. NULL: the grey that the assignment, or else Blender, gives a
+ * surface without material. */
 static struct material_slot slot_get(struct loader *ld, const xmlNode *material)
 {
     for (size_t i = 0; i < ld->num_slots; i++)
@@ -244,7 +245,7 @@ uint32_t material_get(struct loader *ld, const xmlNode *instance, const xmlNode 
         if (symbol != NULL && strcmp(s, symbol) != 0)
             continue;
         if (match != NULL && !is_cgl && symbol == NULL && group != NULL) {
-            match = NULL; /* which of them nobody says */
+            match = NULL; /* ambiguous */
             break;
         }
         if (match != NULL && !is_cgl && symbol != NULL)

@@ -1,4 +1,4 @@
-/* <geometry>: meshes of polygons into triangles, and the analytic sphere of our extras. */
+/* Reads <geometry>: meshes of polygons, which become triangles, and the analytic sphere of our extras. */
 #include "collada_internal.h"
 #include "renderer/scene/triangulate.h"
 
@@ -18,14 +18,14 @@ static const struct {
     {"trifans", "input* p* extra*", CUT_FAN},
 };
 
-/* One polygon at work. */
+/* Scratch memory for one polygon. */
 struct polygon {
     struct corner corners[MAX_POLYGON_CORNERS];
     dvec3 points[MAX_POLYGON_CORNERS];
     uint32_t index[3 * MAX_POLYGON_CORNERS];
 };
 
-/* A mesh at work, and its primitive. */
+/* The mesh that is being read, and its current primitive. */
 struct work {
     struct mesh *mesh;
     struct sources all;
@@ -43,10 +43,10 @@ void mesh_release(struct mesh *m)
     free(m->uv);
 }
 
-/* Texture coordinates beyond float's digits are none. */
+/* Largest texture coordinate: beyond it floats have too few digits. */
 #define MOST_UV 1e6
 
-/* What an input says of a corner of these indices; `what` it is. */
+/* Value of an input for the corner with these indices. what: its name in errors. */
 static dvec3 look_up(struct loader *ld, const xmlNode *p, const struct work *w,
                      const struct input *in, const uint32_t *numbers, const char *what)
 {
@@ -60,7 +60,7 @@ static dvec3 look_up(struct loader *ld, const xmlNode *p, const struct work *w,
     return d3(x[0], x[1], s->size > 2 ? x[2] : 0);
 }
 
-/* Of the indices in `numbers`. */
+/* The corner with the indices in `numbers`; appends its texture coordinates to the mesh. */
 static struct corner read_corner(struct loader *ld, const xmlNode *p, const struct work *w,
                                  const uint32_t *numbers)
 {
@@ -91,8 +91,8 @@ static struct corner read_corner(struct loader *ld, const xmlNode *p, const stru
     return c;
 }
 
-/* The place in <p> of corner k of the polygon that begins at corner `at`. Every other triangle of a
- * strip runs backwards. */
+/* Number, among the corners of <p>, of corner k of the polygon that begins at corner `at`. Every other
+ * triangle of a strip runs backwards. */
 static size_t corner_of(enum cut cut, size_t at, size_t k)
 {
     if (cut == CUT_FAN && k == 0)
@@ -100,7 +100,7 @@ static size_t corner_of(enum cut cut, size_t at, size_t k)
     return at + (cut == CUT_STRIP && at % 2 == 1 && k > 0 ? 3 - k : k);
 }
 
-/* A polygon of n corners into triangles of the mesh. */
+/* Adds a polygon of n corners to the mesh, as triangles. */
 static void add_polygon(struct loader *ld, const xmlNode *p, struct work *w,
                         const uint32_t *numbers, size_t at, size_t n)
 {
@@ -133,7 +133,7 @@ static void add_polygon(struct loader *ld, const xmlNode *p, struct work *w,
     }
 }
 
-/* One <p>. */
+/* Reads one <p>. */
 static void read_p(struct loader *ld, const xmlNode *node, struct work *w)
 {
     struct uints p = {NULL, 0};

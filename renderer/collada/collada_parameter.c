@@ -1,9 +1,9 @@
-/* What the values of a shader lead to: parameters of effects, and images behind textures. */
+/* Resolves what the values of a shader refer to: parameters of effects, and images of textures. */
 #include "collada_internal.h"
 
 #include <string.h>
 
-/* NULL: there is none of that name. */
+/* The value of parameter `sid` for the element `user`; NULL if there is none. */
 static const xmlNode *find(const struct loader *ld, const xmlNode *user, const char *sid)
 {
     const xmlNode *n = element_child_with(ld->instance_effect, "setparam", "ref", sid);
@@ -54,7 +54,7 @@ struct texture_use parameter_get_texture(struct loader *ld, const xmlNode *textu
     const char *name = element_needed_attribute(ld, texture, "texture");
     if (ld->failed)
         return use;
-    /* Some programs name the image itself, as COLLADA 1.3 did. */
+    /* Some programs name the image directly, as in COLLADA 1.3. */
     if (find(ld, texture, name) == NULL) {
         use.image = reference_find(ld, texture, name, "image");
         return use;

@@ -1,4 +1,4 @@
-/* What a primitive's <input>s lead to: <source>s of triples behind accessors. */
+/* Reads the <input>s of primitives: <source>s of points and pairs, through their accessors. */
 #include "collada_internal.h"
 
 #include <stdlib.h>
@@ -11,7 +11,7 @@ void source_release(struct sources *all)
     free(all->data);
 }
 
-/* Positions of the first named <param>s within a stride: unnamed ones are not for us to see. */
+/* Finds the positions within a stride of the first s->wanted named <param>s; unnamed ones are to be skipped. */
 static void read_params(struct loader *ld, const xmlNode *accessor, uint64_t stride,
                         struct source *s, uint64_t param[3])
 {
@@ -53,14 +53,14 @@ static void read_source(struct loader *ld, struct source *s)
                 (unsigned long long)declared);
     if (s->count > 0 && offset + (s->count - 1) * stride + param[s->size - 1] >= s->array.count)
         fail_at(ld, accessor, "<accessor> reaches beyond the end of its <float_array>");
-    /* Moved down, as no stride is below the size. */
+    /* In place, downwards: no stride is below the size. */
     double *out = s->array.data;
     for (uint64_t i = 0; i < s->count && !ld->failed; i++)
         for (unsigned k = 0; k < s->size; k++)
             *out++ = s->array.data[offset + i * stride + param[k]];
 }
 
-/* Its place among all. */
+/* Index in `all` of an input's source, which is read at the first call. */
 static size_t get_source(struct loader *ld, struct sources *all, const xmlNode *input,
                          unsigned wanted)
 {
@@ -78,9 +78,8 @@ static size_t get_source(struct loader *ld, struct sources *all, const xmlNode *
 }
 
 /* Reads an <input> of a primitive, or of its <vertices> (then *of_vertex is the offset of the
- * vertex index). Inputs that matter only with texture coordinates, such as tangents, and unknown
- * semantics are skipped. Vertex colours are ignored in the CGL dialect and an error in COLLADA,
- * where a user would expect to see them. */
+ * vertex index). Tangents and other semantics that nothing uses are skipped. Vertex colours are
+ * ignored in the CGL dialect and an error in COLLADA, where a user would expect to see them. */
 static void read_input(struct loader *ld, struct sources *all, const xmlNode *input,
                        const uint64_t *of_vertex, struct inputs *in)
 {

@@ -8,7 +8,7 @@
 
 #define BLANKS " \t\r\n"
 
-/* The parser leaves one text at most where there are no elements. */
+/* The element's text. Without child elements the parser leaves at most one text node. */
 static const char *text_of(struct loader *ld, const xmlNode *n)
 {
     const xmlNode *child = element_first(n);

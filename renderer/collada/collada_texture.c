@@ -7,7 +7,7 @@
 #include <libxml/uri.h>
 #include <string.h>
 
-/* The file that a URI means: relative to the document's directory, or after file://. */
+/* Path of the file that a URI names: relative to the document's directory, absolute, or after file://. */
 static struct path find_file(struct loader *ld, const xmlNode *n)
 {
     const char *word = text_read_word(ld, n), *rest = strstr(word, "://");
@@ -45,7 +45,7 @@ static const struct image *get_image(struct loader *ld, const xmlNode *image)
     return im;
 }
 
-/* Beyond the edges; a border is black unless it says more, and NONE is a border. */
+/* Reads wrap modes and filter. NONE counts as BORDER; only a black border is supported. */
 static void read_sampler(struct loader *ld, const xmlNode *sampler, struct texture *t)
 {
     static const char WRAPS[] = "WRAP MIRROR CLAMP BORDER NONE";
@@ -89,7 +89,7 @@ uint32_t texture_get(struct loader *ld, const xmlNode *texture, const char **tex
     return s->num_textures;
 }
 
-/* A file that binds nothing means the first. */
+/* Without a binding the first set is meant. */
 size_t texture_find_set(struct loader *ld, const xmlNode *instance, const xmlNode *binding,
                         const char *texcoord, const struct mesh_group *g)
 {

@@ -30,8 +30,8 @@ typedef const xmlError *xml_complaint;
 typedef xmlError *xml_complaint;
 #endif
 
-/* What the parser says, and what the library says without saying of which parser, that memory is out above all: it goes
- * on then, and may leave something out of the tree. Without this it would print it, too. */
+/* Receives the errors of the parser, and those that the library reports without naming a parser, above all lack of
+ * memory: it then goes on and may leave something out of the tree. Without this handler it would also print them. */
 static void complain(void *ctx, xml_complaint error)
 {
     const xmlParserCtxt *ctxt = ctx; /* NULL while there is none */
@@ -58,7 +58,7 @@ static void document_type(void *ctx, const xmlChar *name, const xmlChar *externa
     xmlStopParser(ctxt);
 }
 
-/* A comment becomes a blank and its line ends, so that no text is in pieces and a place in one can be told by its line. */
+/* Replaces a comment by a blank and its line ends, so that texts are not split and their line numbers stay right. */
 static void comment(void *ctx, const xmlChar *text)
 {
     xmlSAX2Characters(ctx, BAD_CAST " ", 1);
@@ -92,8 +92,8 @@ static bool parse(struct loader *ld, struct document *d)
         ctxt->sax->comment = comment;
         ctxt->sax->processingInstruction = NULL;
         ctxt->sax->cdataBlock = xmlSAX2Characters;
-        /* HUGE lifts the limit of 10 MB for one text, which large meshes reach; what else it lifts
-         * (depth, entities) is checked here. */
+        /* HUGE lifts the limit of 10 MB for one text, which large meshes reach; the other limits that
+         * it lifts (depth, entities) are checked in this file. */
         d->doc =
             xmlCtxtReadIO(ctxt, read_some, NULL, ld, NULL, NULL, XML_PARSE_NONET | XML_PARSE_HUGE);
     }
@@ -105,7 +105,7 @@ static bool parse(struct loader *ld, struct document *d)
            element_fail_line(ld, NULL, 1, "not well-formed: no XML document");
 }
 
-/* The survey of the whole document: ids, dialect, and what may not be anywhere. */
+/* The survey of the whole document: ids, dialect, and what is not allowed anywhere. */
 
 static void survey_texts(struct loader *ld, const xmlNode *n)
 {
@@ -116,10 +116,10 @@ static void survey_texts(struct loader *ld, const xmlNode *n)
             fail_at(ld, n, "stray text between the elements of <%.60s>", (const char *)n->name);
 }
 
-/* Whether what is inside is for us to read. */
+/* Checks one element. Returns whether its children are for us to read. */
 static bool survey_element(struct loader *ld, const xmlNode *n, bool *has_cgl)
 {
-    /* Other files may have textures for our meshes. */
+    /* Files that this one refers to may have textures for its meshes. */
     const char *url = element_attribute(n, "url"), *target = element_attribute(n, "target");
     if (ld->num_documents == 1)
         ld->has_textures |= element_is(n, "texture") || (url != NULL && url[0] != '#') ||
@@ -186,7 +186,7 @@ static bool check_root(struct loader *ld, const xmlNode *root)
     return !ld->failed;
 }
 
-/* 0 for another program. */
+/* Version of the Blender that wrote the file; 0 for another program. */
 static double blender_version(const xmlNode *root)
 {
     const xmlNode *by = element_child(element_child(root, "asset"), "contributor"),
@@ -227,8 +227,8 @@ const struct document *xml_open(struct loader *ld, const char *path, FILE *file,
     if (ld->num_documents == 1)
         ld->blender_version = blender_version(root);
     if (ld->dialect == DIALECT_AUTO) {
-        /* The course's scenes without CGL extras (meshedit, keenan, simple) are as these wrote them, which no
-         * other program of these days does. */
+        /* The course's scenes without CGL extras (meshedit, keenan, simple) were written by these versions, of
+         * 2014 and 2015, which nobody exports with today. */
         ld->is_course_export =
             !has_cgl && (ld->blender_version == 2.72 || ld->blender_version == 2.74);
         ld->dialect = has_cgl || ld->is_course_export ? DIALECT_CGL : DIALECT_COLLADA;

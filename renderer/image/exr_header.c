@@ -6,7 +6,7 @@
 enum { MOST_NAME = 255, MOST_ATTRIBUTES = 10000 };
 static const unsigned multi_part = 0x1000;
 
-/* A text that a zero ends; its length, -1 if there is no end in sight. */
+/* Reads a zero-terminated text; returns its length, or -1 if it does not end within MOST_NAME or *left bytes. */
 static int read_text(FILE *f, long *left, char text[MOST_NAME + 1])
 {
     for (int n = 0; n <= MOST_NAME && *left > 0; n++) {
@@ -37,7 +37,8 @@ static bool skip(FILE *f, long *left, long bytes)
     return *left >= 0 && fseek(f, bytes, SEEK_CUR) == 0;
 }
 
-/* Types of one size: OpenEXR reads that many bytes, whatever the attribute says it is long, and what follows for the next. */
+/* Types of fixed size: OpenEXR reads that many bytes whatever length the attribute states, and takes what follows for
+ * the next attribute. */
 static long size_of(const char *type, long length)
 {
     static const struct {
@@ -57,7 +58,7 @@ static long size_of(const char *type, long length)
     return length;
 }
 
-/* Names with 16 bytes each, then an empty one. */
+/* Channels: a name and 16 bytes each, up to an empty name. */
 static bool skip_channels(FILE *f, long *left)
 {
     char name[MOST_NAME + 1];
@@ -71,7 +72,7 @@ static bool skip_channels(FILE *f, long *left)
     }
 }
 
-/* Texts with their lengths before them. */
+/* Texts, each preceded by its length. */
 static bool skip_texts(FILE *f, long *left)
 {
     uint32_t length;
@@ -81,7 +82,7 @@ static bool skip_texts(FILE *f, long *left)
     return true;
 }
 
-/* Width, height, and four bytes for each of their pixels. */
+/* Width, height, and four bytes per pixel. */
 static bool skip_preview(FILE *f, long *left)
 {
     uint32_t width, height;
@@ -90,7 +91,7 @@ static bool skip_preview(FILE *f, long *left)
            skip(f, left, 4 * (long)width * (long)height);
 }
 
-/* A value of `length` bytes, neither more nor less, as OpenEXR would read it. */
+/* Skips a value as OpenEXR would read it; false unless that takes exactly `length` bytes. */
 static bool skip_value(FILE *f, const char *type, long length)
 {
     long left = length;

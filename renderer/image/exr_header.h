@@ -6,9 +6,9 @@
 #include <stdbool.h>
 #include <stdio.h>
 
-/* f: after the eight bytes of magic number and version, `version` the second of them. Whether all
- * attributes of all parts' headers lie in the `left` bytes that follow, each as long as it says and
- * its type has to be [OpenEXR file layout]. */
+/* True if all attributes of the headers of all parts lie in the next `left` bytes of f, each as long
+ * as it states and as its type requires [OpenEXR file layout]. f stands after the eight bytes of magic
+ * number and version; `version` is the latter. */
 bool exr_header_is_whole(FILE *f, unsigned version, long left);
 
 #endif

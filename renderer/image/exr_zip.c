@@ -92,8 +92,8 @@ const float *exr_zip_unpack(struct exr_zip *z, const void *bytes, size_t size, i
     if (libdeflate_zlib_decompress(z->decompressor, bytes, size, z->mixed, length, NULL) !=
         LIBDEFLATE_SUCCESS)
         return NULL;
-    /* Differences reach from the last byte at an even place to the first at an odd one. Their number is even, and the
-     * 128 that each is too large add up to nothing. */
+    /* Differences run on from the last even byte to the first odd one. There is an even number of even bytes, so their
+     * offsets of 128 add up to 0 modulo 256. */
     for (size_t i = 0; i < length / 2; i++)
         last[1] = (uint8_t)(last[1] + even[i]);
     for (size_t i = 0; i < length / 2; i++) {

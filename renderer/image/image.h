@@ -1,5 +1,5 @@
-/* Image files: OpenEXR, PNG and Radiance's, by libraries that load in a moment. Images of other kinds:
- * image_oiio.h. Pixels are float32, interleaved, row 0 at the top. */
+/* Image files: OpenEXR, PNG and Radiance, by libraries that load quickly. Other formats: image_oiio.h.
+ * Pixels are float32, interleaved, row 0 at the top. */
 #ifndef ASSAY_IMAGE_H
 #define ASSAY_IMAGE_H
 
@@ -22,7 +22,7 @@ struct image {
     int num_attrs;
 };
 
-/* Shape and names alone, data NULL: what a file that is written by rows starts from. */
+/* Sets shape and names but leaves data NULL: the head for image_writer_open(). image_free() it. */
 NODISCARD bool image_head(struct image *im, int width, int height, int channels,
                           const char *const *names, struct err *e);
 /* A zeroed image of that shape; names are copied. Fails on sizes below 1 or out of memory. */
@@ -37,28 +37,30 @@ const char *image_get_attr(const struct image *im, const char *name);
 /* Index of a channel by exact name, -1 if absent. */
 int image_channel(const struct image *im, const char *name);
 
-/* What the readers take at most. */
+/* Limits of the readers. */
 enum { IMAGE_MAX_SIDE = 1 << 16, IMAGE_MAX_CHANNELS = 4096 };
 #define IMAGE_MAX_FLOATS 4e9 /* 16384 x 16384 pixels of a dozen channels */
-/* Bytes of pixels for a byte of file: deflate, the densest of the compressions in use, makes one of 1032. A header
- * that promises more is refused before memory is asked for. */
+/* Most bytes of pixels per byte of file: deflate, the densest compression in use, packs 1032 into one. A header that
+ * promises more is refused before memory is allocated. */
 #define IMAGE_MAX_EXPANSION 1032
 
 /* Reads an OpenEXR file (its first part; rows or tiles of halves or floats) with its text attributes.
- * Channels are in the file's order. *half (may be NULL) tells if it stored fewer than 32 bits per
- * channel. */
+ * Channels are in the file's order. *half (may be NULL): some channel has only 16 bits. The caller
+ * frees *out with image_free(). */
 NODISCARD bool image_read_exr(const char *path, struct image *out, bool *half, struct err *e);
-/* The same by rows, of an image that need not be in memory as a whole. NULL with a line on failure; `path` has to last. */
+/* The same row by row, for an image that need not be in memory as a whole. NULL with a line on failure. `path` must
+ * stay valid until image_reader_close(). */
 struct image_reader;
 NODISCARD struct image_reader *image_reader_open(const char *path, struct err *e);
-/* Shape, names, attributes: the reader's; the caller may take and zero it after the last row. */
+/* Shape, names and attributes, owned by the reader. After the last row the caller may copy the struct and zero it, and
+ * then owns them. */
 struct image *image_reader_head(struct image_reader *r);
 bool image_reader_is_half(const struct image_reader *r);
-/* The next *num rows, as many as the file packs together: channel after channel within a row. They belong to the reader and
- * last until the next call. NULL with a line on failure. */
+/* Reads the next *num rows, as many as the file packs together: channel after channel within a row. They belong to the
+ * reader and last until the next call. NULL with a line on failure. */
 NODISCARD const float *image_reader_rows(struct image_reader *r, int *num, struct err *e);
 void image_reader_close(struct image_reader *r);
-/* Puts such rows in their place in an image. */
+/* Copies such rows to rows y .. y+num-1 of an image. */
 void image_put_rows(struct image *im, int y, const float *rows, int num);
 /* The header alone: data stays NULL. */
 NODISCARD bool image_read_exr_head(const char *path, struct image *out, struct err *e);
@@ -69,15 +71,15 @@ NODISCARD bool image_read_hdr(const char *path, struct image *out, struct err *e
  * appears whole, by rename, or not at all. */
 NODISCARD bool image_write_exr(const char *path, const struct image *im, struct err *e);
 
-/* The same for an image that is never in memory as a whole: its rows come from the top, IMAGE_BAND at a time and
- * the rest last, and the file appears when it is closed. */
+/* The same for an image that is never in memory as a whole: its rows are written from the top, IMAGE_BAND at a time,
+ * the last ones as many as are left. The file appears when the writer is closed. */
 enum { IMAGE_BAND = 16 };
 struct image_writer;
-/* head: shape, names and attributes; has to stay as it is until the end. NULL with a line on failure. */
+/* head: shape, names and attributes; must stay unchanged until the writer is closed. NULL with a line on failure. */
 NODISCARD struct image_writer *image_writer_open(const char *path, const struct image *head,
                                                  struct err *e);
 NODISCARD bool image_writer_rows(struct image_writer *w, const float *rows, int num, struct err *e);
-/* Both free the writer. Without close there is no file; after a failure there is only abandon. */
+/* Both free the writer. Only close makes the file appear; after a failure of image_writer_rows(), call abandon. */
 NODISCARD bool image_writer_close(struct image_writer *w, struct err *e);
 void image_writer_abandon(struct image_writer *w);
 
@@ -87,7 +89,7 @@ NODISCARD bool image_write_png(const char *path, int width, int height, const ui
                                struct err *e);
 NODISCARD bool image_encode_png(int width, int height, const uint8_t *rgb8, uint8_t **bytes,
                                 size_t *size, struct err *e);
-/* The file with texts (tEXt, of ASCII) before its pixels. */
+/* The same with texts (tEXt chunks, ASCII) before the pixels. */
 NODISCARD bool image_write_png_texts(const char *path, int width, int height, const uint8_t *rgb8,
                                      const struct image_attr *attr, int num_attrs, struct err *e);
 

@@ -18,7 +18,8 @@ struct stream {
     char why[200];
 };
 
-/* A file that is written holds its lock where memory runs out, and asking it for our data would wait for that forever. */
+/* While writing, OpenEXR reports lack of memory with the context's lock held; exr_get_user_data() would wait for that
+ * lock forever. */
 static void drop_complaint(exr_const_context_t f, exr_result_t code, const char *msg)
 {
     (void)f;
@@ -83,7 +84,7 @@ struct image_writer {
     int y; /* the next row */
 };
 
-/* What packs the rows: by the order of channels in the file. */
+/* Sets up the packing of rows, by the order of channels in the file. */
 static exr_result_t start_rows(struct image_writer *w)
 {
     const exr_attr_chlist_t *list;
@@ -142,7 +143,7 @@ bool image_writer_rows(struct image_writer *w, const float *rows, int num, struc
 bool image_writer_close(struct image_writer *w, struct err *e)
 {
     assert(w->y == w->head->height);
-    exr_result_t r = exr_finish(&w->f); /* writes the table of rows */
+    exr_result_t r = exr_finish(&w->f); /* writes the table of chunk offsets */
     bool ok = r == EXR_ERR_SUCCESS;
     if (ok) {
         ok = out_commit(&w->file, e);

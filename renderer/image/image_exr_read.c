@@ -15,11 +15,11 @@
 struct stream {
     int fd;
     char why[200];
-    bool no_memory; /* for a text of the header: OpenEXR leaves it out and goes on */
+    bool no_memory; /* memory ran out for an attribute: OpenEXR drops it and goes on */
 };
 
-/* Only while reading: a file that is written holds its lock where memory runs out, and asking it for our data would
- * wait for that forever. */
+/* Only while reading: while writing, OpenEXR reports lack of memory with the context's lock held, and
+ * exr_get_user_data() would wait for that lock forever. */
 static void keep_complaint(exr_const_context_t f, exr_result_t code, const char *msg)
 {
     void *s = NULL;
@@ -78,12 +78,12 @@ struct image_reader {
     bool half, tiled;
     int y, first_y;        /* the next row; the number of the first in the file */
     int band, across;      /* rows that are packed together; columns of a tile */
-    float *rows;           /* so many */
-    struct exr_zip *zip;   /* NULL: packed in another way */
-    unsigned char *packed; /* as many bytes as rows */
+    float *rows;           /* room for one band */
+    struct exr_zip *zip;   /* NULL: the library unpacks */
+    unsigned char *packed; /* as many bytes as `rows` */
 };
 
-/* The shape that the header says, and its texts. */
+/* Reads shape and text attributes from the header. */
 static bool read_header(struct image_reader *reader, struct err *e)
 {
     exr_context_t f = reader->f;
@@ -130,7 +130,7 @@ static bool read_header(struct image_reader *reader, struct err *e)
         return err_prefix(e, "%s", path);
     reader->tiled = storage == EXR_STORAGE_TILED;
     reader->first_y = w.min.y;
-    /* "type" says how the file is made, not what of, and a writer has its own. */
+    /* "type" describes the layout of the file, not the image, and the writer sets its own. */
     for (int i = 0; i < num_attrs; i++) {
         const exr_attribute_t *a;
         if (exr_get_attribute_by_index(f, 0, EXR_ATTR_LIST_FILE_ORDER, i, &a) == EXR_ERR_SUCCESS &&
@@ -141,7 +141,7 @@ static bool read_header(struct image_reader *reader, struct err *e)
     return true;
 }
 
-/* Where the rows of a chunk go that begins at column x. */
+/* Points the decoder's channels to their places in r->rows, for a chunk that begins at column x. */
 static void point_channels(const struct image_reader *r, exr_coding_channel_info_t *c, int num,
                            int x)
 {
@@ -182,7 +182,7 @@ static exr_result_t read_tiles(struct image_reader *r)
     return result;
 }
 
-/* What is not as it should be is left to the library, which knows a word for it. */
+/* Reads the next num rows. Whatever exr_zip_unpack() cannot read is left to the library, which says what is wrong. */
 static exr_result_t read_band(struct image_reader *r, int num, const float **rows)
 {
     exr_chunk_info_t chunk;
@@ -202,7 +202,7 @@ static exr_result_t read_band(struct image_reader *r, int num, const float **row
     return read_chunk(r, &chunk, 0);
 }
 
-/* What the rows come in. */
+/* Allocates the buffers for the rows. */
 static exr_result_t start_reading(struct image_reader *r)
 {
     exr_compression_t compression;

@@ -1,5 +1,5 @@
-/* Radiance images, RGBE. Our own: the libraries that read nothing else take a file that is cut short
- * for black pixels. Format: G. Ward, Real pixels, in Graphics Gems II, 1991. */
+/* Radiance images, RGBE. A reader of our own, since the small libraries return black pixels where a
+ * file is cut short. Format: G. Ward, Real pixels, in Graphics Gems II, 1991. */
 #include "image.h"
 
 #include "renderer/base/fs.h"
@@ -12,7 +12,7 @@
 
 enum { MIN_PACKED = 8, MAX_PACKED = 0x7fff };
 
-/* Up to the line of the size, which it reads. */
+/* Reads the header, up to and including the line with the size. */
 static bool read_header(FILE *f, int *width, int *height)
 {
     char line[256];
@@ -26,7 +26,7 @@ static bool read_header(FILE *f, int *width, int *height)
            sscanf(line, "-Y %9d +X %9d%c", height, width, &end) == 3 && end == '\n';
 }
 
-/* One component of a row, in runs. */
+/* Reads one component of a row, run-length encoded. */
 static bool read_runs(FILE *f, int width, uint8_t *rgbe)
 {
     for (int x = 0; x < width;) {

@@ -29,7 +29,7 @@ bool image_oiio_file(struct path *path, struct err *e)
     return err_set(e, "cannot load what reads images: %s is not there", path->s);
 }
 
-/* Loaded for good at the first call; it is found again at the others. */
+/* The first call loads the library for good; later ones find it again. */
 static const struct image_library *load(struct err *e)
 {
     struct path path;
@@ -51,7 +51,7 @@ static bool is_targa(const char *path)
     return dot != NULL && strcasecmp(dot, ".tga") == 0;
 }
 
-/* Which of the documented formats the file is of, by its first bytes; NULL with a line. */
+/* Name of the file's format, told by its first bytes; NULL with a line if it is not one of the documented ones. */
 static const char *format_of(const char *path, enum use use, double *size, struct err *e)
 {
     struct stat st;
@@ -100,7 +100,7 @@ static bool check_shape(const char *path, int width, int height, int channels, s
                    height, channels);
 }
 
-/* Floats of an image of which the file may hold as little as a pixel. */
+/* Floats of a display window that are always allowed, however few of its pixels the file holds. */
 #define MAX_SHOWN 1e8
 
 static bool check_size(const char *path, const struct image_info *i, int depth, double bytes,
@@ -119,7 +119,8 @@ static bool check_size(const char *path, const struct image_info *i, int depth, 
                    path, i->data_width, i->data_height, i->channels, i->width, i->height);
 }
 
-/* The library left to itself would try every reader that it has, for seconds and with gigabytes if the file is of none. */
+/* Opens a file with the reader for its format. OpenImageIO on its own would try all its readers, for seconds and with
+ * gigabytes of memory if none fits. */
 static struct library_image *open_image(const char *path, enum use use,
                                         const struct image_library **with, struct image_info *out,
                                         struct err *e)
@@ -144,7 +145,7 @@ static struct library_image *open_image(const char *path, enum use use,
     return NULL;
 }
 
-/* The shape with its names, and room for the pixels. */
+/* Allocates *im with the shape and channel names of an open file. */
 static bool alloc_like(const struct image_library *library, const struct library_image *p,
                        const struct image_info *info, struct image *im, struct err *e)
 {
@@ -154,7 +155,7 @@ static bool alloc_like(const struct image_library *library, const struct library
     return image_alloc(im, info->data_width, info->data_height, info->channels, names, e);
 }
 
-/* The pixels of an open file, which it closes. */
+/* Reads pixels and texts of an open file, and closes it. */
 static bool read_pixels(const char *path, const struct image_library *library,
                         struct library_image *p, const struct image_info *info, struct image *out,
                         struct err *e)
@@ -186,7 +187,7 @@ bool image_read(const char *path, struct image *out, bool *half, struct err *e)
     return p != NULL && read_pixels(path, library, p, &info, out, e);
 }
 
-/* Which channels are red, green and blue. */
+/* Finds the channels for red, green and blue, all the same for grey. False if there are none. */
 static bool colour_channels(const struct image *im, int which[3])
 {
     static const char *const names[3] = {"R", "G", "B"};
@@ -209,7 +210,7 @@ static float linear_of(float stored, double power)
     return (float)(c <= 0.04045 ? c / 12.92 : pow((c + 0.055) / 1.055, 2.4));
 }
 
-/* Of 8 bits there are 256 numbers, each with a power that takes longer than all the rest. */
+/* Converts to linear R, G and B. 8-bit values go through a table, since pow() would take longer than all the rest. */
 static bool take_colours(struct image *im, const struct image_info *info, struct image *out,
                          struct err *e)
 {

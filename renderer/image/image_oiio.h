@@ -1,15 +1,16 @@
-/* Images from elsewhere: PNG by libpng, all else by OpenImageIO. That library brings 230 others along and takes a fifth of a second to
- * load, so it is in a file of its own, oiio.so, which is loaded when the first such image is read; without it the call fails with a
- * line. */
+/* Images of other programs: PNG by libpng, all else by OpenImageIO. That library loads 230 others, which takes a fifth
+ * of a second, so it is in a file of its own, oiio.so, which is loaded when the first such image is read; without it
+ * the call fails with a line. */
 #ifndef ASSAY_IMAGE_OIIO_H
 #define ASSAY_IMAGE_OIIO_H
 
 #include "image.h"
 #include "renderer/base/fs.h"
 
-/* Reads OpenEXR, Radiance, PNG, PFM and PNM, told by their first bytes. Integer formats come scaled to [0,1], no
- * colour conversion. Of OpenEXR it is the data window; PNG's texts of more than 256 KiB are left out. Refuses, unread, what is
- * larger than the limits of image.h. *half (may be NULL) tells if the file stored fewer than 32 bits per channel. */
+/* Reads OpenEXR, Radiance, PNG, PFM and PNM, told by their first bytes. Integers are scaled to [0,1], without colour
+ * conversion. Of OpenEXR the data window is read; texts of a PNG above 256 KiB are dropped. What exceeds the limits of
+ * image.h is refused before pixels are read. *half (may be NULL): the file stores fewer than 32 bits per channel. The
+ * caller frees *out with image_free(). */
 NODISCARD bool image_read(const char *path, struct image *out, bool *half, struct err *e);
 
 /* Reads the colours of an OpenEXR, PNG, JPEG, Radiance or (by its name's ending) Targa file as channels R, G and B of
@@ -29,22 +30,22 @@ enum image_type {
 };
 struct image_info {
     char format[16];      /* OpenImageIO's name: "openexr", "png", "hdr", "pnm" (PFM too), .. */
-    enum image_type type; /* the smallest of its channels */
-    int bytes;            /* of one value of that channel */
+    enum image_type type; /* of the narrowest channel */
+    int bytes;            /* per value of that channel */
     double power;    /* exponent that makes stored numbers linear, or IMAGE_SRGB; for textures */
     int orientation; /* as in Exif: 1 is row 0 at the top, from left to right */
     int parts;       /* images in one file (EXR parts), 1 .. */
     int width, height, channels; /* of OpenEXR: of the display window */
-    bool is_cropped;             /* the file holds another rectangle than the image: */
+    bool is_cropped;             /* the file holds another rectangle than the image, this: */
     int data_x, data_y, data_width, data_height; /* from the image's top left corner */
 };
 NODISCARD bool image_inspect(const char *path, struct image_info *out, struct err *e);
 
-/* Makes what image_read() found in the file the image that is shown: 0 in all channels where the file has nothing,
- * without what lies outside. */
+/* Turns the rectangle that image_read() returned into the whole displayed image: 0 in all channels where the file has
+ * nothing, without pixels outside. */
 NODISCARD bool image_uncrop(const struct image_info *info, struct image *im, struct err *e);
 
-/* The file that it is loaded from. */
+/* The path of oiio.so. False with a line, and where it should be, if it is not there. */
 NODISCARD bool image_oiio_file(struct path *path, struct err *e);
 
 /* Text that names the library: "OpenImageIO 2.4.7"; NULL with a line if it cannot be loaded. */

@@ -10,15 +10,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* For memory that it lacks libpng has many words, "too many text chunks" among them: errno, which is 0 before, knows better.
- * It comes back by longjmp() after this, so all that is to be freed lies with those who call the function with the setjmp(). */
+/* libpng reports lack of memory in many words, "too many text chunks" among them; errno, cleared before, is reliable.
+ * longjmp() follows, so everything that must be freed belongs to the callers of the function with the setjmp(). */
 static void failed(png_structp png, png_const_charp message)
 {
     err_set(png_get_error_ptr(png), "%s", errno == ENOMEM ? "out of memory" : message);
     png_longjmp(png, 1);
 }
 
-/* A failure too, but told when libpng is done: for want of memory it may lose a text with no more than a warning. */
+/* While writing a warning is a failure too, reported when libpng is done: it may drop a text for lack of memory with no
+ * more than a warning. */
 static void warned(png_structp png, png_const_charp message)
 {
     struct err *why = png_get_error_ptr(png);
@@ -105,13 +106,13 @@ struct library_image {
     png_infop info;
     struct err why;
     size_t left;  /* bytes that may still be read of the file */
-    int channels; /* once it is expanded */
+    int channels; /* after expansion */
 };
 
 enum {
     MAX_TEXTS = 200,
-    MAX_CHUNK = 1 << 18, /* bytes of a text or a profile, inflated; libpng leaves longer ones out */
-    MAX_BLOCK = 1 << 23  /* a row has less, and what a chunk says is reserved before it is there */
+    MAX_CHUNK = 1 << 18, /* bytes of an inflated text or profile; libpng drops longer ones */
+    MAX_BLOCK = 1 << 23  /* more than a row; libpng allocates a chunk's stated length unread */
 };
 
 static void read_bytes(png_structp png, png_bytep to, size_t size)
@@ -137,14 +138,15 @@ static void free_block(png_structp png, png_voidp block)
     free(block);
 }
 
-/* What is wrong beside the pixels harms no pixel, unless memory ran out: then a gamma may be what was lost. */
+/* Warnings while reading concern metadata and are ignored, unless memory ran out: the gamma may have been lost then. */
 static void pardoned(png_structp png, png_const_charp message)
 {
     if (errno == ENOMEM)
         failed(png, message);
 }
 
-/* From Exif, which is TIFF: the short of tag 0x112 in its first directory [TIFF 6.0, 2]. 1 if there is none. */
+/* Orientation from Exif data, which have the form of TIFF: the 16-bit value of tag 0x112 in the first directory [TIFF
+ * 6.0, 2]; 1 if there is none. */
 static int orientation_of(const uint8_t *exif, size_t size)
 {
     const bool little = size >= 8 && exif[0] == 'I';
@@ -171,7 +173,7 @@ static bool read_chunks(struct library_image *p)
 {
     if (setjmp(png_jmpbuf(p->png)))
         return false;
-    png_set_user_limits(p->png, PNG_UINT_31_MAX, PNG_UINT_31_MAX); /* the caller has his own */
+    png_set_user_limits(p->png, PNG_UINT_31_MAX, PNG_UINT_31_MAX); /* the caller checks its own */
     png_set_chunk_malloc_max(p->png, MAX_CHUNK);
     png_set_chunk_cache_max(p->png, MAX_TEXTS);
     png_set_read_fn(p->png, p, read_bytes);
@@ -210,7 +212,8 @@ static double power_of(const struct library_image *p)
     return 1e5 / fmax(1, (double)gamma);
 }
 
-/* Palettes will be colours, fewer bits than 8 be 8, and what is transparent have a channel more. */
+/* Describes the image after expansion: palettes become colours, fewer than 8 bits become 8, transparency becomes a
+ * channel. */
 static bool head_of(struct library_image *p, struct image_info *out, int *depth, double *bytes,
                     char *why, size_t size)
 {
@@ -245,8 +248,9 @@ static const char *channel_of(const struct library_image *p, int c)
     return (p->channels < 3 ? grey : colours)[c];
 }
 
-/* No data are longer than twice what they inflate to. Before the last row libpng has read no more than it needed; after it it would
- * inflate all that is left, a thousandfold of the file. Each pass of an interlaced file fills some pixels of the rows. */
+/* Compressed data are at most twice as long as what they inflate to. Up to the last row libpng reads no more than it
+ * needs; then it would inflate all that is left, up to a thousand times the size of the file, so the limit is lowered.
+ * Each pass of an interlaced file fills some pixels of the rows. */
 static bool read_rows(struct library_image *p, uint8_t *rows, size_t size, png_uint_32 height)
 {
     if (setjmp(png_jmpbuf(p->png)))

@@ -21,7 +21,7 @@ static bool alloc_doubles(struct moments *m, struct err *e)
            err_set(e, "out of memory for moments of %d x %d pixels", m->width, m->height);
 }
 
-/* In one piece, which begins with n. */
+/* Allocates the packed arrays as one block, which begins with n. */
 static bool alloc_packed(struct moments *m, struct err *e)
 {
     size_t pixels = (size_t)m->width * (size_t)m->height;
@@ -213,7 +213,7 @@ struct moments_writer *moments_writer_open(const char *path, const struct moment
     return NULL;
 }
 
-/* Pixels first .. end-1 as floats of all channels. */
+/* Interleaves all channels of pixels first .. end-1 as floats. */
 static void interleave(const struct moments *m, const struct image *layers, size_t first,
                        size_t end, size_t channels, float *out)
 {
@@ -282,14 +282,14 @@ bool moments_write(const char *path, const struct moments *m, const struct image
     return moments_write_layers(path, m, NULL, attrs, num_attrs, e);
 }
 
-/* One value of a moments EXR: finite, M2 (channels 3 to 5) >= 0, n (channel 9) a whole number >= 0. */
+/* True for a valid value of a moments EXR: finite, M2 (channels 3 to 5) >= 0, n (channel 9) a whole number >= 0. */
 static bool is_valid(float v, int channel)
 {
     const bool least = channel < 3 || (channel > 5 && channel < 9) || v >= 0;
     return fabsf(v) <= FLT_MAX && least && (channel < 9 || v >= 0x1p23f || v == (float)(int)v);
 }
 
-/* What a moments EXR says of itself, and where its channels are. */
+/* Reads the attributes of a moments EXR into *m and finds its channels. */
 static bool read_head(const char *path, struct image_reader *r, struct moments *m, int at[10],
                       struct err *e)
 {
@@ -319,7 +319,7 @@ static bool read_head(const char *path, struct image_reader *r, struct moments *
            err_set(e, "%s: assay:spp '%s' is not a number of samples", path, spp);
 }
 
-/* Row y, whose channels begin at `row`. */
+/* Checks and stores row y. row: its values, channel after channel. */
 ISA_CLONES static bool take_row(const char *path, struct moments *m, const int at[10], size_t y,
                                 const float *row, struct err *e)
 {

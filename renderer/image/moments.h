@@ -14,14 +14,14 @@ struct moments {
     double *m2;   /* 3 per pixel */
     double *m3;   /* 3 per pixel */
     /* What one observation is: "sample", "replicate", "exact" (a closed form: n = 1, M2 = M3 = 0, no
-     * uncertainty), or "stratified": a sample that is not independent of the pixel's others, so that
-     * M2 tells nothing about the error of the mean. Of a comparison also "picture": a mean of
-     * unknown samples, whose M2 was guessed from its neighbours (tools/stats/noise_estimate.h); n counts nothing. */
+     * uncertainty), or "stratified" (a sample that is not independent of the pixel's others, so that
+     * M2 tells nothing about the error of the mean). In comparisons also "picture": a mean of
+     * unknown samples, with M2 estimated from neighbours (tools/stats/noise_estimate.h) and n without meaning. */
     char unit[16];
     double spp; /* paths per pixel in one observation; 0 where that has no meaning */
-    /* How far the mean may be off on top of its variance, because its numbers were rounded: 3 per
-     * pixel, absolute, in the same direction in all pixels at worst. NULL: not at all. Lives in
-     * memory only: no file has it, and moments_merge() refuses it. */
+    /* Largest rounding error of the mean, on top of its noise, where the file's values were rounded: 3
+     * per pixel, absolute, at worst in the same direction in all pixels. NULL: none. Never stored in a
+     * file; moments_merge() refuses it. */
     double *tolerance;
     /* The same as float32, in half the memory; n to m3 are then NULL. Only for comparisons, which read by
      * moments_n() to moments_m3(), moments_run() or moments_unpack(). */
@@ -30,7 +30,7 @@ struct moments {
     } packed;
 };
 
-/* Of a pixel; of value 3 pixel + channel. */
+/* n of a pixel; mean, M2 and M3 at index i = 3 pixel + channel. For doubles and packed floats. */
 static inline double moments_n(const struct moments *m, size_t pixel)
 {
     return m->n != NULL ? m->n[pixel] : (double)m->packed.n[pixel];
@@ -48,23 +48,23 @@ static inline double moments_m3(const struct moments *m, size_t i)
     return m->n != NULL ? m->m3[i] : (double)m->packed.m3[i];
 }
 
-/* All zero, unit "sample", spp 1. */
+/* Allocates moments that are all zero, unit "sample", spp 1. Free with moments_free(). */
 NODISCARD bool moments_alloc(struct moments *m, int width, int height, struct err *e);
 void moments_free(struct moments *m);
-/* The same observations in memory of its own, without a tolerance. */
+/* Allocates a copy, without a tolerance. `from` must not be packed. */
 NODISCARD bool moments_copy(const struct moments *from, struct moments *to, struct err *e);
 
-/* One more observation of one pixel. */
+/* Adds one observation of one pixel. */
 void moments_add(struct moments *m, size_t pixel, const double x[3]);
-/* One more observation of every pixel: a whole replicate (RGB, 3 floats a pixel). */
+/* Adds one observation of every pixel: a whole replicate (RGB, 3 floats a pixel). */
 void moments_add_image(struct moments *m, const float *pixels_rgb);
-/* dst += src, as if all observations had been added to one [Pebay08 eq. 2.1]. Same sizes, or fails
- * (as it does on different units or spp). */
+/* dst += src, as if all observations had been added to dst [Pebay08 eq. 2.1]. Fails on different sizes,
+ * units or spp, and on a tolerance. */
 NODISCARD bool moments_merge(struct moments *dst, const struct moments *src, struct err *e);
-/* Pixels first .. first+num-1 in the order of their rows, as an image one pixel high for
+/* A view of pixels first .. first+num-1, in the order of rows, as an image one pixel high for
  * moments_merge(). Owns nothing. */
 struct moments moments_run(const struct moments *m, size_t first, int num);
-/* Rows y .. y+num-1. Owns nothing. */
+/* A view of rows y .. y+num-1. Owns nothing. */
 struct moments moments_rows(const struct moments *m, int y, int num);
 /* Variance of the pixel's mean, M2/(n(n-1)); NAN if n < 2 or stratified, 0 if exact. channel 0..2. */
 double moments_var_of_mean(const struct moments *m, size_t pixel, int channel);
@@ -77,10 +77,10 @@ NODISCARD bool moments_write(const char *path, const struct moments *m,
 NODISCARD bool moments_write_layers(const char *path, const struct moments *m,
                                     const struct image *layers, const struct image_attr *attrs,
                                     int num_attrs, struct err *e);
-/* The same for an image that is never in memory as a whole: moments of whole rows come from the
- * top, IMAGE_BAND rows or a multiple of that at a time and the rest last. */
+/* The same for an image that is never in memory as a whole: moments of whole rows are written from
+ * the top, a multiple of IMAGE_BAND at a time except for the last. */
 struct moments_writer;
-/* first: has width, unit and spp of all; layers: has their names. NULL with a line on failure. */
+/* first: gives width, unit and spp; layers: gives names of more channels (NULL: none). NULL with a line on failure. */
 NODISCARD struct moments_writer *moments_writer_open(const char *path, const struct moments *first,
                                                      int height, const struct image *layers,
                                                      const struct image_attr *attrs, int num_attrs,
@@ -90,9 +90,9 @@ NODISCARD bool moments_writer_rows(struct moments_writer *w, const struct moment
 /* Both free the writer; the file appears with close. */
 NODISCARD bool moments_writer_close(struct moments_writer *w, struct err *e);
 void moments_writer_abandon(struct moments_writer *w);
-/* Reads one. If `image` is not NULL it receives the raw image too (attributes; caller frees). Fails
- * with a line on a file that is not a moments EXR, on half floats, NaN or infinity, negative M2 or
- * n, n not a whole number, or no pixel. */
+/* Reads a moments EXR; the caller frees. If `image` is not NULL it receives the whole image, too, with
+ * all channels and attributes. Fails with a line on a file that is not a moments EXR, on half floats,
+ * NaN or infinity, negative M2 or n, or n not a whole number. */
 NODISCARD bool moments_read(const char *path, struct moments *out, struct image *image,
                             struct err *e);
 /* The same, packed. */

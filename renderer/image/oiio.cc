@@ -1,4 +1,4 @@
-// The one C++ file: image_library.h. Exceptions end here, as text.
+// OpenImageIO behind image_library.h, in the one C++ file. Exceptions become error texts here.
 extern "C" {
 #include "image_library.h"
 }
@@ -86,7 +86,7 @@ bool head_of(struct library_image *p, struct image_info *out, int *depth, double
         bool exr = format == "openexr";
         out->width = exr ? spec.full_width : spec.width;
         out->height = exr ? spec.full_height : spec.height;
-        // Further off than any image is wide, it shows nothing anyway.
+        // Clamped: an offset beyond the width of any image shows nothing anyway.
         const long long far = 1 << 20;
         out->data_x = int(std::clamp((long long)spec.x - spec.full_x, -far, far));
         out->data_y = int(std::clamp((long long)spec.y - spec.full_y, -far, far));
@@ -144,7 +144,7 @@ int parts_of(struct library_image *p)
 {
     int parts = 1;
     char why[8];
-    // What cannot be sought is no further image.
+    // A part to which it cannot seek is not there.
     guarded(why, sizeof why, [&]() -> std::string {
         while (p->in->seek_subimage(parts, 0))
             parts++;

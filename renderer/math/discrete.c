@@ -12,7 +12,7 @@ double discrete_build(const double *weight, uint32_t n, uint32_t *end)
         total += weight[i];
         positive += weight[i] > 0;
     }
-    /* One step each, the rest by weight. The last sum is the total to the bit. */
+    /* One step for each positive weight, the rest in proportion. The last sum equals the total bit for bit. */
     for (uint32_t i = 0; i < n; i++) {
         sum += weight[i];
         seen += weight[i] > 0;

@@ -1,11 +1,12 @@
-/* Exponential and error functions by short polynomials, so that every lane has the same bits in any width. Relative
- * error below 3e-7 and 6e-7. */
+/* Exponential and error function by short polynomials, so that a lane has the same bits at any vector width. Relative
+ * errors below 3e-7 and 6e-7. */
 #ifndef ASSAY_EXP_H
 #define ASSAY_EXP_H
 
 #include "simd.h"
 
-/* e^x of x <= 0; 0 below -87, where float's normal numbers end. By powers of 2 and e^r, |r| <= ln(2)/2: coefficients [Moshier92]. */
+/* e^x for x <= 0, as 2^n e^r with |r| <= ln(2)/2 (coefficients of [Moshier92]); 0 below -87, about where normal floats
+ * end. */
 INLINE vf exp_negative(vf x)
 {
     const vf least = vf_set(-87);
@@ -18,8 +19,8 @@ INLINE vf exp_negative(vf x)
     return vf_select(vf_lt(x, least), vf_set(0), p * as_vf((n + 127) << 23));
 }
 
-/* e^(x^2) erfc(x) of x >= 0: a polynomial in s = 1/(1 + x/2) of the least relative error, by Remez's
- * algorithm. */
+/* e^(x^2) erfc(x) for x >= 0, the scaled complementary error function: a polynomial in s = 1/(1 + x/2),
+ * fitted for the least relative error by Remez's algorithm. */
 INLINE vf exp_erfcx(vf x)
 {
     vf s = 1 / (1 + 0.5f * x);

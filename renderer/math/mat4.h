@@ -70,7 +70,7 @@ static inline mat4 mat4_scale(dvec3 s)
 {
     return (mat4){{{s.x, 0, 0, 0}, {0, s.y, 0, 0}, {0, 0, s.z, 0}, {0, 0, 0, 1}}};
 }
-/* Counter-clockwise by angle (radians) seen against the unit axis a. */
+/* Rotation by `angle` (radians) about the unit axis a, counter-clockwise when a points at the viewer. */
 static inline mat4 mat4_rotate(dvec3 a, double angle)
 {
     double c = cos(angle), s = sin(angle), k = 1 - c;
@@ -108,7 +108,7 @@ static inline bool mat4_is_affine(const mat4 *a)
 {
     return a->m[3][0] == 0 && a->m[3][1] == 0 && a->m[3][2] == 0 && a->m[3][3] == 1;
 }
-/* Of the linear part. */
+/* Determinant of the linear part, the upper left 3 x 3. */
 static inline double mat4_det3(const mat4 *a)
 {
     return d3_dot(mat4_column(a, 0), d3_cross(mat4_column(a, 1), mat4_column(a, 2)));

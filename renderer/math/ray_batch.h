@@ -24,8 +24,8 @@ struct rgbs {
 struct rays {
     struct vec3s o, d;
     float tmin[BATCH_ROOM], tmax[BATCH_ROOM];
-    /* Occlusion only: a sphere (primitive number) that does not count, or NO_HIT. A shadow ray that
-     * ends at the rim of a spherical light cannot tell by distance that it has arrived. */
+    /* Occlusion only: primitive number of a sphere that is not tested, or NO_HIT. At the rim of a
+     * spherical light its distance does not tell whether a shadow ray has already reached it. */
     uint32_t ignore[BATCH_ROOM];
 };
 

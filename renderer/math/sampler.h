@@ -5,13 +5,13 @@
  * Independent: the counter-based generator Philox4x32-10 [Salmon11]; the four indices are its
  * counter, the seed its key.
  *
- * Sobol: for each (pixel, vertex, purpose) the samples 0, 1, 2, ... are points of one digital
- * sequence in 4 dimensions, scrambled as a nested uniform scrambling would [Owen95] by a hash
- * [Burley20]; scrambles and order of the points are chosen by hashes of the pixel under keys that
- * Philox makes of (seed, vertex, purpose), so blocks are padded and pixels are decorrelated. Each
- * number is uniform, but the samples of one pixel depend on each other: their spread is no measure
- * of the error of their mean. What is promised of samples k 2^m .. (k+1) 2^m - 1 of a block, for
- * every k:
+ * Sobol: for each block (pixel, vertex, purpose) the samples 0, 1, 2, ... are points of one digital
+ * sequence in 4 dimensions, under a nested uniform scrambling [Owen95] by a hash [Burley20].
+ * Scrambles and order of the points come from hashes of the pixel under keys that Philox makes of
+ * (seed, vertex, purpose), so the blocks of a path are padded and pixels are decorrelated. Each
+ * number is uniform, but the samples of one pixel depend on each other: their variance is no measure
+ * of the error of their mean. Guaranteed for samples k 2^m .. (k+1) 2^m - 1 of a block, for every
+ * k:
  * - u[0..1] and u[2..3] are (0,m,2)-nets in base 2: one point in each box of area 2^-m;
  * - u[0..3] is a (0,m/2,4)-net in base 4 if m is even: one point in each box of volume 2^-m whose
  *   sides are powers of 1/4. */
@@ -44,7 +44,7 @@ enum sampler_purpose {
 void sampler_philox4x32(const uint32_t counter[4], const uint32_t key[2], int rounds,
                         uint32_t out[4]);
 
-/* Independent numbers, for what needs no choice of a sampler. */
+/* Independent numbers, where there is no choice of sampler. */
 struct sample4 sampler_get(uint64_t seed, uint32_t pixel, uint32_t sample, uint32_t vertex,
                            uint32_t purpose);
 

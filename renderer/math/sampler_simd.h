@@ -1,4 +1,4 @@
-/* The numbers of sampler.h, lane by lane of their own pixel and sample. */
+/* The functions of sampler.h on lanes, each lane with its own pixel and sample. */
 #ifndef ASSAY_SAMPLER_SIMD_H
 #define ASSAY_SAMPLER_SIMD_H
 
@@ -51,8 +51,8 @@ INLINE void philoxv(vu pixel, vu sample, uint32_t vertex, uint32_t purpose,
      : (k) == 3 ? 0x00FF00FFu                                                                      \
                 : 0x0000FFFFu)
 
-/* P times a vector whose first element is the lowest bit. By Lucas' theorem P is a Kronecker product of
- * five matrices (1 1; 0 1), one for each bit of the place. */
+/* P (see sobolv()) times a vector of 32 bits, the lowest bit first. By Lucas' theorem P is the Kronecker
+ * product of five matrices (1 1; 0 1), one for each bit of the index. */
 INLINE vu pascal_2v(vu x)
 {
     for (int k = 0; k < 5; k++)
@@ -60,8 +60,8 @@ INLINE vu pascal_2v(vu x)
     return x;
 }
 
-/* U times a vector of 16 field elements of two bits, a + b w with a in the lower. The like product of
- * matrices (1 w^(2^k); 0 1), where the exponents 1, 2, 4, 8 are 1, 2, 1, 2 modulo 3. */
+/* U (see sobolv()) times a vector of 16 field elements of two bits, a + b w with a in the lower bit. U is
+ * the Kronecker product of matrices (1 w^(2^k); 0 1); the exponents 1, 2, 4, 8 are 1, 2, 1, 2 modulo 3. */
 INLINE vu pascal_4v(vu x)
 {
     for (int k = 0; k < 4; k++) {
@@ -72,11 +72,11 @@ INLINE vu pascal_4v(vu x)
     return x;
 }
 
-/* The unscrambled point `index` of the sequence, as binary fractions with their bits in reverse (the lowest is worth 1/2).
- * Its generator matrices are I, P, U and PU: P is Pascal's triangle mod 2, so that the first two
- * are Sobol's; U is the like triangle over the field of four elements 0, 1, w, w^2 with entries
- * binomial(j, i) w^(j-i), the fields' elements written as matrices of 2 x 2 bits. All four together
- * are the sequence of [Faure82] in base 4, as [Niederreiter87] has it for prime powers; (U, PU) is
+/* The unscrambled point `index` of the sequence, as binary fractions in reversed bit order (the lowest is worth 1/2).
+ * The generator matrices are I, P, U and PU. P is Pascal's triangle mod 2, so that the first two
+ * are Sobol's; U is the analogous triangle over the field of four elements 0, 1, w, w^2, with entries
+ * binomial(j, i) w^(j-i), the field's elements written as matrices of 2 x 2 bits. All four together
+ * are the sequence of [Faure82] in base 4, generalised to prime powers by [Niederreiter87]; (U, PU) is
  * (I, P) with its points in another order, since U is triangular. */
 INLINE void sobolv(vu index, vu x[4])
 {
@@ -98,7 +98,7 @@ INLINE vu scramble_upwardsv(vu x, vu seed)
     return x;
 }
 
-/* A permutation of the numbers of 32 bits in which each bit of x changes half of the result [Wellons18]. */
+/* A permutation of the 32-bit numbers in which each input bit changes about half of the output bits [Wellons18]. */
 INLINE vu hash_bitsv(vu x)
 {
     x ^= x >> 16;
@@ -108,7 +108,7 @@ INLINE vu hash_bitsv(vu x)
     return x ^ x >> 16;
 }
 
-/* What all pixels have in common of a (vertex, purpose) under Sobol's sampler. */
+/* The keys of a (vertex, purpose) under the Sobol sampler, the same for all pixels. */
 struct sobol_keys {
     uint32_t order, scramble[4];
 };
@@ -124,8 +124,8 @@ static inline struct sobol_keys sobol_keys(uint64_t seed, uint32_t vertex, uint3
     return k;
 }
 
-/* The first `used` numbers of sampler_draw(); the others are not set. block: of the vertex and purpose, which
- * independent numbers do not use. */
+/* The first `used` numbers of sampler_draw(); the others are undefined. block: keys of the vertex and purpose, which
+ * the independent sampler does not use. */
 INLINE void drawv(enum sampler_kind kind, const struct philox_keys *keys,
                   const struct sobol_keys *block, vu pixel, vu sample, uint32_t vertex,
                   uint32_t purpose, int used, vf u[4])

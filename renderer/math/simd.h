@@ -1,14 +1,14 @@
-/* Lanes of float or of int32: vf, vi and vu (unsigned) hold LANES numbers each, one, eight or sixteen as the Makefile
- * says when it compiles. + - * / and & | ^ ~ are operators on them, LANE() is a lane, the rest is below. The same source gives
- * every lane the same bits in every width. Truth is a lane of ones.
+/* Lanes of float or of int32: vf, vi and vu (unsigned) hold LANES numbers each: one, eight or sixteen, set by the
+ * Makefile. + - * / and & | ^ ~ work on them as operators, LANE() accesses one lane, the rest is below. The same source
+ * gives a lane the same bits at every width. A true comparison is a lane of all ones.
  *
  * In simd_one.h, simd_eight.h and simd_sixteen.h:
  *   vf_set, vi_set          the same number in all lanes
  *   vf_of_int, vi_truncate  conversions, the latter towards zero, |a| < 2^31
  *   vi_numbers              0, 1, 2, ...
- *   vi_divide               quotient by an int, of numbers from 0 to 2^31 - 1
+ *   vi_divide               quotients of numbers from 0 to 2^31 - 1 by one int
  *   vf_min, vf_max          as minf and maxf: if either is NaN the second wins
- *   vf_hypot                sqrt(a a + b b) by way of double
+ *   vf_hypot                sqrt(a a + b b), computed in double
  *   vf_lt, vf_le, vf_eq, vi_lt, vi_eq, vf_select
  *   bits, lanes_of          a mask as an integer, bit k for lane k; and back
  *   front_order, pick       the lanes of a mask, in order; pick() moves these lanes of a vector to the front
@@ -32,7 +32,7 @@
 
 enum { COLUMNS = 8, ALL_LANES = (1 << LANES) - 1 };
 
-/* name_avx2, say: the Makefile defines ISA, once for each set. */
+/* For example name_avx2: the Makefile compiles a file once for each instruction set and defines ISA. */
 #define FOR_ISA(name)  JOIN(name, ISA)
 #define JOIN(a, b)     JOIN_NOW(a, b)
 #define JOIN_NOW(a, b) a##_##b
@@ -65,7 +65,7 @@ INLINE vi vi_truncate(vf a)
 #include "simd_eight.h"
 #endif
 
-/* The lanes from number k on of n: a mask for bits(). */
+/* Mask, as of bits(), of the lanes that hold elements k .. n-1 of a list of n: all LANES, or the first n - k. */
 INLINE unsigned lanes_there(int k, int n)
 {
     return n - k >= LANES ? (unsigned)ALL_LANES : (1u << (n - k)) - 1;
@@ -83,7 +83,7 @@ INLINE vf as_vf(vi a)
     memcpy(&v, &a, sizeof v);
     return v;
 }
-/* p anywhere. */
+/* Load and store without alignment. */
 INLINE vf vf_load_any(const void *p)
 {
     vf v;

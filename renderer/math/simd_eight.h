@@ -34,7 +34,7 @@ INLINE vi vi_divide(vi a, int by)
     return __builtin_convertvector((p + 0.5) * (1.0 / by), vi);
 }
 
-/* mul_sub: a b - c, mul_add: a b + c, rounded once where the machine can. */
+/* mul_sub: a b - c, mul_add: a b + c; fused (rounded once) where the machine has FMA. */
 #ifdef __AVX2__
 INLINE vf vf_min(vf a, vf b)
 {
@@ -242,7 +242,7 @@ INLINE void store_flags(void *flags, vi mask)
     memcpy(flags, &bytes, sizeof bytes);
 }
 
-/* Each byte turned by its halves, which are looked up, and the bytes of each number turned. */
+/* Reverses each byte by table look-ups of its two nibbles, then the order of bytes in each number. */
 INLINE vu vu_reverse_bits(vu a)
 {
     const vi nibbles = {0x0C040800, 0x0E060A02, 0x0D050901, 0x0F070B03,
@@ -354,13 +354,13 @@ INLINE vw vw_xor(vw a, vw b, uint32_t k)
 }
 #endif
 
-/* Eight rows of eight, turned. */
+/* Loads eight rows of eight and transposes them. */
 INLINE void gather_columns(const float *base, size_t stride, const int32_t index[LANES],
                            vf column[COLUMNS])
 {
     vf a[LANES], b[LANES];
     for (int i = 0; i < LANES; i++) {
-        vf row; /* not a[i]: what an address is taken of stays in memory */
+        vf row; /* not a[i]: an array whose address is taken would stay in memory */
         memcpy(&row, base + stride * (size_t)index[i], sizeof row);
         a[i] = row;
     }

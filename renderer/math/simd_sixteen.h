@@ -1,5 +1,5 @@
-/* Sixteen lanes on the compiler's vector extensions (gcc and clang) and AVX-512, with the bits of simd_eight.h. Part of
- * simd.h, which says what each function does. */
+/* Sixteen lanes on the compiler's vector extensions (gcc and clang) and AVX-512; results have the same bits as those of
+ * simd_eight.h. Part of simd.h, which says what each function does. */
 #ifndef ASSAY_SIMD_SIXTEEN_H
 #define ASSAY_SIMD_SIXTEEN_H
 
@@ -81,7 +81,7 @@ INLINE vi vi_eq(vi a, vi b)
 {
     return a == b;
 }
-/* Written so that gcc sees a mask register in it. */
+/* Written such that gcc compiles it to a blend under a mask register. */
 INLINE vf vf_select(vi mask, vf yes, vf no)
 {
     return (vf)((mask & (vi)yes) | (~mask & (vi)no));
@@ -108,7 +108,7 @@ INLINE unsigned spread_flags(const void *flags, unsigned mask)
     return _pdep_u32(_mm_test_epi8_mask(set, set), mask);
 }
 
-/* Each byte turned by its halves, which are looked up, and the bytes of each number turned. */
+/* Reverses each byte by table look-ups of its two nibbles, then the order of bytes in each number. */
 INLINE vu vu_reverse_bits(vu a)
 {
     const __m512i nibbles = _mm512_set4_epi32(0x0F070B03, 0x0D050901, 0x0E060A02, 0x0C040800);
@@ -145,7 +145,8 @@ INLINE vw vw_xor(vw a, vw b, uint32_t k)
                 _mm512_ternarylogic_epi64(a.odd, b.odd, c, 0x96)};
 }
 
-/* Sixteen rows of eight, turned: fourths of rows i, 4 + i, 8 + i, 12 + i side by side, then each four by four. */
+/* Loads sixteen rows of eight and transposes them, four columns at a time: those of rows i, 4 + i, 8 + i and 12 + i
+ * share a register, then each block of 4 x 4 is transposed. */
 INLINE void gather_columns(const float *base, size_t stride, const int32_t index[LANES],
                            vf column[COLUMNS])
 {

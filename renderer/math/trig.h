@@ -1,11 +1,11 @@
-/* Sine and cosine by short polynomials, so that every lane has the same bits in any width. Coefficients:
- * [Moshier92], of single precision. Off by less than 1.5e-7. */
+/* Sine, cosine and arctangent by short polynomials, so that a lane has the same bits at any vector width.
+ * Single-precision coefficients of [Moshier92]. Absolute error of sine and cosine below 1.5e-7. */
 #ifndef ASSAY_TRIG_H
 #define ASSAY_TRIG_H
 
 #include "simd.h"
 
-/* Of x radians, |x| <= pi/4. */
+/* Sine and cosine of x radians, |x| <= pi/4. */
 INLINE void trig_small(vf x, vf *sine, vf *cosine)
 {
     vf xx = x * x;
@@ -16,7 +16,7 @@ INLINE void trig_small(vf x, vf *sine, vf *cosine)
             (4.166664568298827e-2f + xx * (-1.388731625493765e-3f + xx * 2.443315711809948e-5f));
 }
 
-/* Of v turns, 0 <= v < 1: the nearest quarter, and what is left. */
+/* Sine and cosine of v turns, 0 <= v < 1: reduced by the nearest quarter turn. */
 INLINE void trig_turn(vf v, vf *sine, vf *cosine)
 {
     const float two_pi = 6.28318530717958647693f;
@@ -29,14 +29,14 @@ INLINE void trig_turn(vf v, vf *sine, vf *cosine)
     *sine = as_vf(as_vi(across) ^ (vi)(((vu)quarter & 2) << 30));
 }
 
-/* The angle of (x, y), -pi to pi; relative to its size off by less than 3e-7. */
+/* The angle of (x, y), -pi to pi, with a relative error below 3e-7. */
 INLINE vf trig_atan2(vf y, vf x)
 {
     const vf zero = vf_set(0), ax = vf_abs(x), ay = vf_abs(y);
     const vi steep = vf_lt(ax, ay);
     const vf most = vf_select(steep, ay, ax), least = vf_select(steep, ax, ay);
     vf t = least / vf_max(most, vf_set(1e-37f));
-    /* tan(pi/8): beyond it an eighth of a turn less. */
+    /* Above tan(pi/8) the angle is reduced by an eighth of a turn. */
     const vi beyond = vf_lt(vf_set(0.4142135623730950f), t);
     t = vf_select(beyond, (t - 1) / (t + 1), t);
     vf z = t * t;

@@ -1,6 +1,6 @@
 /* Arithmetic of triples and frames, written once for one number (vec.h) and for lanes of them (vec_simd.h), which
- * define HOW functions are declared, the types, OF(name) for functions' names, ROOT(), and SIGN_OF(), 1 with the sign of
- * a number. */
+ * define HOW (the functions' storage class), the types, OF(name) (the functions' names), ROOT(), and SIGN_OF() (1 with
+ * the sign of a number). */
 
 HOW VEC3 OF(add)(VEC3 a, VEC3 b)
 {

@@ -66,7 +66,7 @@ INLINE rgbv rgb_select(vi mask, rgbv yes, rgbv no)
     return (rgbv){vf_select(mask, yes.r, no.r), vf_select(mask, yes.g, no.g),
                   vf_select(mask, yes.b, no.b)};
 }
-/* Black elsewhere. */
+/* a where the mask is set, black elsewhere. */
 INLINE rgbv rgb_where(vi mask, rgbv a)
 {
     return rgb_select(mask, a, rgb_all((rgb){0, 0, 0}));

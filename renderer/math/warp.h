@@ -10,10 +10,10 @@
 INLINE void warp_disk(vf u, vf v, vf *x, vf *y)
 {
     vf a = 2 * u - 1, b = 2 * v - 1, s, c;
-    /* Within an eighth of a turn from the nearer axis. */
+    /* The angle is taken from the nearer axis, so it is at most an eighth of a turn. */
     vi near_x = vf_lt(vf_abs(b), vf_abs(a));
     vf r = vf_select(near_x, a, b), other = vf_select(near_x, b, a);
-    /* Only both can be 0: then so is r, whatever the angle. */
+    /* r is 0 only where both are: then the angle does not matter. */
     trig_small(0.25f * PI_F * (other / vf_select(vf_eq(r, vf_set(0)), vf_set(1), r)), &s, &c);
     *x = r * vf_select(near_x, c, s);
     *y = r * vf_select(near_x, s, c);
@@ -26,12 +26,13 @@ INLINE vec3v warp_cosine_hemisphere(vf u, vf v)
     warp_disk(u, v, &x, &y);
     return v3v(x, y, vf_sqrt(vf_max(vf_set(0), 1 - x * x - y * y)));
 }
-/* Of a direction above the surface, by its cosine. */
+/* pdf of a direction above the surface, given its cosine to the normal. */
 INLINE vf warp_cosine_hemisphere_pdf_w(vf cosine)
 {
     return cosine * INV_PI_F;
 }
 
+/* Unit direction of height z, -1 to 1, at an azimuth of v turns. */
 INLINE vec3v warp_from_height(vf z, vf v)
 {
     vf r = vf_sqrt(vf_max(vf_set(0), 1 - z * z)), sine, cosine;

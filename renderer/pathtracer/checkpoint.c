@@ -12,7 +12,7 @@
 
 enum { NUM_LINES = 9, LINE = 600, MAX_ARRAYS = 8 };
 
-/* The head: what has to be the same, a line each. */
+/* The head of the file: a line for each thing that must match. */
 static void head_lines(char line[NUM_LINES][LINE], const struct render_id *id, bool first_hits)
 {
     snprintf(line[0], LINE, "assay state 1\n");
@@ -31,7 +31,7 @@ struct array {
     size_t each; /* bytes of a pixel */
 };
 
-/* The body, after num_samples and whether there is a target, both uint32_t. */
+/* The arrays of the body, which follow num_samples and a flag for the target, both uint32_t. Returns how many. */
 static int body_arrays(struct array a[MAX_ARRAYS], const struct film *f)
 {
     int n = 0;
@@ -112,7 +112,7 @@ static bool check_head(FILE *f, struct sha256_ctx *ctx, const char *path,
     return true;
 }
 
-/* What follows the head: as long as it has to be, and with the hash that stands at its end. */
+/* Reads what follows the head: true if its length is right and it ends with its hash. */
 static bool check_body(const struct checkpoint *s, struct sha256_ctx *ctx, uint32_t counts[2])
 {
     uint8_t block[1 << 16], digest[SHA256_DIGEST_SIZE], stored[SHA256_DIGEST_SIZE];
@@ -121,7 +121,7 @@ static bool check_body(const struct checkpoint *s, struct sha256_ctx *ctx, uint3
     size_t left = 0;
     if (!get(s->f, ctx, counts, 2 * sizeof *counts) || counts[1] > 1)
         return false;
-    /* Only whether they are there is looked at. */
+    /* body_arrays() only checks whether these are NULL. */
     struct first_hit_sums some = {0};
     shape.first = s->first_hits ? &some : NULL;
     shape.target = counts[1] == 1 ? counts : NULL;
@@ -171,7 +171,7 @@ void checkpoint_close(struct checkpoint *s)
     s->f = NULL;
 }
 
-/* Counts that later code relies on; the sums may be anything that the hash vouches for. */
+/* Checks the counts, on which later code relies; the hash vouches for the sums. */
 static bool counts_are_sane(const double *n, int num, uint32_t most)
 {
     for (int i = 0; i < num; i++)

@@ -4,8 +4,8 @@
 
 #include <stdlib.h>
 
-/* Lightness rises evenly while (a, b) goes once along a half turn of the circle through the grey axis whose
- * diameter is the largest chroma: a helix, so the speed is constant. The numbers keep it inside sRGB. */
+/* A helix in Oklab: lightness rises linearly while (a, b) goes once around a circle through the grey axis, whose
+ * diameter is the largest chroma, so the speed is constant. The constants keep it inside sRGB. */
 void heatmap_colour(double t, uint8_t rgb8[3])
 {
     const double pi = 3.14159265358979323846, chroma = 0.2, hue = 288 * pi / 180;

@@ -246,7 +246,7 @@ static const struct cli_option options[] = {
     {'h', "help", "", "print this", TO(action), ACTION_HELP, .stops = true},
     {.read = read_scene}};
 
-/* What only all options together tell. */
+/* Defaults and checks that depend on several options. */
 static bool complete(struct options *s, struct err *e)
 {
     if (!s->accumulate)

@@ -20,10 +20,10 @@ struct options {
     int cell[4]; /* x y dx dy, origin at the bottom left */
     int dialect, accel, isa, kind, direct, fresnel, sampler, frame;
     unsigned starter; /* 1 << enum cs184_deviation (cs184_deviations.h) */
-    int spp;          /* of the whole image, the most if adaptive */
+    int spp;          /* paths per pixel, in all shares; the most if adaptive */
     int first, last;  /* sample numbers first .. last-1 are this program's share */
     int light_samples, threads, max_bounces, first_bounce;
-    int accumulate; /* 0: only light that bounced exactly max_bounces times, which first_bounce then says */
+    int accumulate; /* 0: only light that bounced exactly max_bounces times: first_bounce is set to it */
     bool quiet, aov, keep_state;
     enum roulette_kind roulette;
     double survival; /* of ROULETTE_FIXED */
@@ -41,16 +41,16 @@ struct options {
     enum { ACTION_RENDER, ACTION_CAMERAS, ACTION_HELP, ACTION_VERSION, ACTION_LIST } action;
 };
 
-/* cli_apart() of a command that options_parse() took. */
+/* cli_apart() for a command line that options_parse() has accepted. */
 NODISCARD char **options_apart(int argc, char **argv);
 /* Fills *o from the command line, with defaults where it is silent. An action other than
  * ACTION_RENDER leaves the rest unchecked, but for the scene of ACTION_CAMERAS. */
 NODISCARD bool options_parse(int argc, char **argv, struct options *o, struct err *e);
 
-/* What --help, --version and --list say, on stdout; nothing of the other actions. */
+/* Prints what --help, --version and --list say, on stdout; nothing for other actions. */
 void options_print(const struct options *o);
 
-/* Does a file name end in .exr (else it ends in .png)? */
+/* True if a file name ends in .exr; those of output[] otherwise end in .png. */
 bool image_is_exr(const char *path);
 
 #endif

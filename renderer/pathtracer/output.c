@@ -30,7 +30,7 @@ static struct path rates_path(const char *png)
 
 enum { NUM_TEXTS = 13 };
 
-/* The metadata of an EXR. command is its own, to free(). */
+/* The metadata of an EXR. `command` must be freed. */
 struct texts {
     char *command, samples[64], seconds[64], rays[128];
     struct image_attr attr[NUM_TEXTS];
@@ -150,7 +150,7 @@ bool output_rows(struct output_writer *w, const struct film *band, struct err *e
     return true;
 }
 
-/* Nothing in it depends on the file's name, the threads or the jobs: the same pixels are the same file. */
+/* Nothing in the file depends on its name, the threads or the jobs, so the same pixels give the same file. */
 static bool write_png(const struct output_writer *w, const char *path, const uint8_t *rgb8,
                       struct err *e)
 {
@@ -294,7 +294,7 @@ void output_print_summary(const struct output *o, const struct film *f,
 
 void output_print_how_to_resume(const struct output *o, const struct film *f)
 {
-    /* Right behind the program: "--" may end the options. */
+    /* --resume goes right after the program's name, since "--" may end the options. */
     const char **word = calloc((size_t)o->argc + 3, sizeof *word);
     char *command = NULL;
     int n = 0;

@@ -10,27 +10,27 @@ struct output {
     const struct scene *scene;
     char accel[160]; /* what the rays are traced with, in words */
     const char *
-        ranges; /* "0:4,4:9": sums of these sample ranges were added up; NULL: samples one by one */
+        ranges; /* "0:4,4:9": sums of these sample ranges were added up; NULL: single samples */
     int argc;
     char **argv;
 };
 
-/* All images of the options, each by rename, and beside each PNG of an adaptive render its sampling
- * rates (X.png -> X_rate.png). stats may be NULL while rendering goes on. */
+/* Writes all images of the options, each by rename, and beside each PNG of an adaptive render its
+ * sampling rates (X.png -> X_rate.png). stats may be NULL while rendering goes on. */
 NODISCARD bool output_images(const struct output *o, const struct film *f,
                              const struct render_stats *stats, struct err *e);
 
-/* Can all of these files, and the state, be written? Asked before the render starts. */
+/* Checks, before the render starts, that all these files, the state and the heat map can be written. */
 NODISCARD bool output_check(const struct output *o, struct err *e);
 
-/* For a film that output_images() could not write, for the reason in e: writes all images under names that no
- * file has, beside the first, else in the current directory, else in TMPDIR or /tmp, and adds to the line where they are.
- * Always false. */
+/* For a film that output_images() could not write, for the reason in *e: writes all images as rescued-PID-NAME beside
+ * the first image, else in the current directory, else in TMPDIR or /tmp, and adds to the line where they are. Always
+ * false. */
 bool output_rescue(const struct output *o, const struct film *f, const struct render_stats *stats,
                    struct err *e);
 
-/* output_images() for a film that is never in memory as a whole: its rows come from the top as films of whole rows, IMAGE_BAND
- * rows (image.h) or a multiple of that at a time and the rest last. Bit by bit the images of the whole film. */
+/* output_images() for a film that is never in memory as a whole: it is given from the top as films of whole rows, a
+ * multiple of IMAGE_BAND (image.h) at a time except for the last. Images are bit for bit those of the whole film. */
 struct output_writer;
 /* num_samples: film.num_samples of the whole. NULL with a line on failure. */
 NODISCARD struct output_writer *output_open(const struct output *o, int width, int height,
@@ -49,11 +49,11 @@ NODISCARD bool output_state_path(const struct output *o, const char *image,
 /* The assignment's colours of a sampling rate n/most: blue (0) through green (1/2) to red (1). */
 void rate_colour(double rate, uint8_t rgb8[3]);
 
-/* The image mean with its standard error, on stdout; what it cost, and the files that were written, on stderr. */
+/* Prints the image mean with its standard error on stdout, the cost and the files written on stderr. */
 void output_print_summary(const struct output *o, const struct film *f,
                           const struct render_stats *stats);
 
-/* On stderr: how far the render came, and the command that goes on with it. */
+/* Prints on stderr how far the render came, and the command that resumes it. */
 void output_print_how_to_resume(const struct output *o, const struct film *f);
 
 #endif

@@ -18,16 +18,16 @@
 
 enum { EXIT_BAD_INPUT = 3, EXIT_SIGNAL = 128 };
 
-/* What the renderer's control calls back with. */
+/* The argument of the callbacks in struct render_control. */
 struct session {
     struct output out;
     char state_path[CHECKPOINT_PATH];
-    sigset_t signals; /* blocked while rendering, so that they can be looked for */
+    sigset_t signals; /* blocked while rendering, so that they can be polled */
     int signal;       /* the first that came; 0: none */
 };
 
-/* SIGINT and SIGTERM wait until they are asked for; those that the parent wants ignored stay so. All
- * threads inherit this. */
+/* Blocks SIGINT and SIGTERM, so that signal_came() can poll them; one that the parent has set to be
+ * ignored stays ignored. All threads inherit the mask. */
 static void hold_signals(struct session *s)
 {
     static const int numbers[] = {SIGINT, SIGTERM};
@@ -40,7 +40,7 @@ static void hold_signals(struct session *s)
     pthread_sigmask(SIG_BLOCK, &s->signals, NULL);
 }
 
-/* After the first signal a second one has its usual effect: the end at once. */
+/* Polls for a signal. After the first one they are unblocked, so a second one ends the program at once. */
 static bool signal_came(void *arg)
 {
     struct session *s = arg;
@@ -174,7 +174,7 @@ static bool start_film(const struct session *s, const struct options *o, struct 
     return true;
 }
 
-/* Images, and the state if it can be of use; a state that this render has outlived goes. */
+/* Writes the images, and the state if it may be needed; otherwise removes an old state. */
 static bool finish(struct session *s, const struct film *f, const struct render_stats *stats,
                    struct err *e)
 {
@@ -236,7 +236,7 @@ done:
     return ok;
 }
 
-/* The same with a seed of several, as if the command were "--seed N -f OUT_N.exr ...", which is what the image says. */
+/* The same for seed k of several, as if the command were "--seed N -f OUT_N.exr ...", as the metadata then say. */
 static bool render_one_of(struct session *s, int k, const struct camera *camera,
                           const struct bvh *bvh, struct err *e)
 {
@@ -298,14 +298,15 @@ static bool run(struct session *s, struct err *e)
         ok = ok && render_seed(s, &camera, bvh, true, e);
     for (int k = 0; o->num_seeds > 1 && ok && k < o->num_seeds && s->signal == 0; k++)
         ok = render_one_of(s, k, &camera, bvh, e);
-    s->out.id = NULL; /* this function's own */
+    s->out.id = NULL; /* pointed to locals */
     s->out.scene = NULL;
     bvh_free(bvh);
     scene_free(&scene);
     return ok;
 }
 
-/* assay plans, submits and gathers; it calls us again for each part. Returns only if it cannot be run. */
+/* Replaces this process by `assay slurm`, which plans, submits and gathers, and runs this program for each part.
+ * Returns only if it cannot be run. */
 static bool hand_over(int argc, char **argv, struct err *e)
 {
     struct path path = fs_beside_program("assay");

@@ -18,7 +18,7 @@ __attribute__((format(printf, 2, 3))) static void add_setting(struct render_id *
     va_end(args);
 }
 
-/* Of all files that textures are from and of all that the scene refers to; "" if there are none. */
+/* One hash of all texture files and of all other documents that the scene was read from; "" if there are none. */
 static bool hash_files(const struct scene *s, char hex[65], struct err *e)
 {
     char text[2 * 65];

@@ -8,14 +8,15 @@
 
 struct render_id {
     char scene[65];     /* SHA-256 of the scene file, lower-case hex */
-    char settings[512]; /* what decides the law of a sample: "integrator path; direct mis; ..." */
+    char settings[512]; /* options that affect samples: "integrator path; direct mis; ..." */
     char adaptive[96];  /* "off", "rule N TOL" or "pilot N TOL most SPP" */
     char seed[24];
     char cell[64]; /* "X Y DX DY of W H", origin at the bottom left */
     uint32_t first_sample;
 };
 
-/* Reads scene and camera file and what else the loaded scene is from to hash them. */
+/* Reads and hashes the scene file, camera and environment file, and all other files of the loaded scene. False with a
+ * line if one cannot be read. */
 NODISCARD bool render_id_make(const struct options *o, const struct scene *s, struct render_id *id,
                               struct err *e);
 

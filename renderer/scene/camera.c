@@ -48,8 +48,7 @@ bool camera_init(struct camera *c, const struct scene *s, int width, int height,
     const struct scene_camera *f = &s->camera;
     *c = (struct camera){.width = width, .height = height, .near = f->near, .far = f->far};
     if (s->dialect == DIALECT_CGL) {
-        /* The assignment draws a scene without a camera from a default one, which the loader set.
-         */
+        /* For a scene without a camera the loader has set the assignment's default one. */
         place_cgl(c, s);
         angles_cgl(c, f);
         return true;

@@ -1,4 +1,4 @@
-/* From pixels to rays: pinhole, thin lens or parallel, and where in and around a pixel they begin. */
+/* From pixels to rays: pinhole, thin lens or orthographic camera, and the pixel filter. */
 #ifndef ASSAY_CAMERA_H
 #define ASSAY_CAMERA_H
 
@@ -19,15 +19,14 @@ struct camera {
     struct pixel_filter filter; /* all zero: the box of one pixel */
 };
 
-/* Frames the scene for a width x height image by the scene's dialect: COLLADA keeps the file's
- * pose and horizontal angle or size (or, if it has only a vertical one, that) with square pixels; CGL
- * re-places the eye on the file's viewing direction at 1.5 bounding-box diagonals, fits the angle
- * at 800x600 and crops to the size asked for (notes in renderer/README.md). Pinhole. Fails if a
- * COLLADA file has no camera. */
+/* Frames the scene for an image of width x height pixels. COLLADA: keeps the file's pose and its
+ * horizontal angle or size (the vertical one if it has no other), with square pixels. CGL: puts the
+ * eye on the file's viewing direction, 1.5 diagonals of the frame box from its centre, fits the angle
+ * to 800 x 600 pixels and crops to the size asked for. Pinhole. Fails if a COLLADA file has no camera. */
 NODISCARD bool camera_init(struct camera *c, const struct scene *s, int width, int height,
                            struct err *e);
 
-/* Of a camera of the CGL dialect: shows in any size what the assignment shows at 800 x 600, or as much as fits. */
+/* For a camera of the CGL dialect: at any size shows all that the assignment shows at 800 x 600. */
 void camera_show_whole(struct camera *c);
 
 /* Replaces pose and angles by those of a camera file of the assignment (its key D writes them).

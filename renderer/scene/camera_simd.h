@@ -5,7 +5,7 @@
 #include "camera.h"
 #include "renderer/math/warp.h"
 
-/* Origins and unit directions of the rays that camera_ray() says. */
+/* Origins and unit directions of the rays described at camera_ray(). */
 INLINE void camera_rays(const struct camera *c, vf x, vf y, vf u, vf v, vec3v *o, vec3v *d)
 {
     vf sx = (2 * x / (float)c->width - 1) * c->tan_h;

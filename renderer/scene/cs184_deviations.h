@@ -22,7 +22,7 @@ static inline bool starter_has(const struct scene *s, enum cs184_deviation what)
  * follows the file) and changes the kind of rough metals. To be called once, before the hierarchy is built. */
 void cs184_deviations_apply(struct scene *s, unsigned bits);
 
-/* The point of a rectangle that stands for p of the turned one: by 90 degrees about its centre, in its plane. */
+/* p, a point of a rectangular light, turned by 90 degrees about its centre in its plane; p itself on other lights. */
 vec3 cs184_deviations_turn(const struct scene *s, const struct light *l, vec3 p);
 
 #endif

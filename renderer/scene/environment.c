@@ -80,14 +80,14 @@ static bool copy_texels(struct environment *env, const struct image *im, const c
     return !black || err_set(e, "%s: the environment map is black everywhere", where);
 }
 
-/* sin^2(theta/2) where row r of cells begins. */
+/* sin^2(theta/2) at the upper edge of row r of cells. */
 static double bound(const struct environment *env, uint32_t r)
 {
     double s = sin((r - 0.5) * PI / (2.0 * env->height));
     return r == 0 ? 0 : r > env->height ? 1 : s * s;
 }
 
-/* Of cell edges: row r begins, column c begins, or somewhere behind that. */
+/* Unit direction of a place: integral r is the upper edge of row r, integral c the left edge of column c. */
 static dvec3 direction(const struct environment *env, double r, double c)
 {
     double theta = fmin(fmax(r - 0.5, 0), env->height) * PI / env->height,
@@ -95,16 +95,17 @@ static dvec3 direction(const struct environment *env, double r, double c)
     return d3(-sin(theta) * cos(phi), cos(theta), sin(theta) * sin(phi));
 }
 
-/* A region: its luminance summed over solid angle, the unit direction of most of it, and how far it goes from there. */
+/* A region: its luminance integrated over solid angle, the unit direction in the middle of its light, and the largest
+ * angle (radians) between that and any of its directions. */
 struct region {
     double weight, angle;
     dvec3 middle;
 };
 
-/* The cosine factor for light from a region, for a surface whose normal is known only to within
- * `angle`. x: cosine between the rounded normal and the middle of the region. Where part of the
- * region may be below the horizon it is the mean of max(0, c) over c in [x - sin(angle), x +
- * sin(angle)]; from 90 degrees on a linear ramp. Positive wherever light may arrive. */
+/* About the cosine factor of the light from a region. x: cosine between the rounded normal and the
+ * middle of the region; angle: the region's extent plus the rounding of the normal. Where part of
+ * the region may be below the horizon, the mean of max(0, c) over c in [x - sin(angle), x +
+ * sin(angle)]; from 90 degrees on, a linear ramp. Positive wherever light may arrive. */
 static double part_received(double x, double angle)
 {
     const double s = sin(angle);
@@ -113,7 +114,7 @@ static double part_received(double x, double angle)
     return x >= s ? x : x > -s ? (x + s) * (x + s) / (4 * s) : 0;
 }
 
-/* The choice among regions for one rounded normal n. */
+/* Fills end[], the table for choosing a region under the rounded normal n. */
 static void build_regions(const struct environment *env, dvec3 n, const struct region *region,
                           uint32_t *end)
 {
@@ -131,8 +132,8 @@ static void build_regions(const struct environment *env, dvec3 n, const struct r
     discrete_build(rows, env->num_rows, end);
 }
 
-/* Middle and angle of region (i, j), the sum over whose rows of luminance times direction is
- * `towards`. Of a region of no more than a quarter turn the corners are furthest. */
+/* Sets middle and angle of region (i, j). towards: the sum over its rows of luminance times direction.
+ * In a region no wider than a quarter turn the corners are the furthest points. */
 static void bound_region(const struct environment *env, uint32_t i, uint32_t j, dvec3 towards,
                          struct region *region)
 {
@@ -149,12 +150,12 @@ static void bound_region(const struct environment *env, uint32_t i, uint32_t j, 
     region->angle = acos(fmax(-1, least));
 }
 
-/* The tables of choice. weight has room for a row and for a column of cells. */
+/* Builds the tables by which cells are chosen. weight: scratch for a row and a column of cells. */
 static void build_tables(struct environment *env, double *weight, struct region *region)
 {
     const uint32_t rows = env->height + 1, width = env->width;
     for (uint32_t r = 0; r < rows; r++) {
-        /* The bottom row is the top one of a world upside down. */
+        /* In the lower half theta is taken from the bottom, so the tables are mirrored. */
         const bool lower = r > env->height / 2;
         env->begin[r] = (float)(lower ? bound(env, rows - r) : bound(env, r));
         env->growth[r] = (float)(bound(env, r + 1) - bound(env, r)) * (lower ? -1.0f : 1.0f);
@@ -200,7 +201,7 @@ static void build_tables(struct environment *env, double *weight, struct region 
         const dvec3 n =
             d3(k / (NORMAL_SIDE * NORMAL_SIDE) - NORMAL_STEPS,
                k / NORMAL_SIDE % NORMAL_SIDE - NORMAL_STEPS, k % NORMAL_SIDE - NORMAL_STEPS);
-        /* Those that unit vectors round to. */
+        /* Only the grid points that unit vectors can round to. */
         if (fabs(d3_length(n) - NORMAL_STEPS) < 0.5 * sqrt(3))
             build_regions(env, n, region,
                           env->region_end + (size_t)k * env->num_rows * (1 + env->num_columns));
@@ -226,7 +227,7 @@ struct environment *environment_from_image(const struct image *im, const char *w
     env->num_rows = rows < REGION_ROWS ? (uint32_t)rows : REGION_ROWS;
     env->num_columns = columns < REGION_COLUMNS ? (uint32_t)columns : REGION_COLUMNS;
     env->texel =
-        calloc(columns * env->height + 2, sizeof *env->texel); /* two behind are read, too */
+        calloc(columns * env->height + 2, sizeof *env->texel); /* gather_columns() reads 2 beyond */
     env->begin = calloc(rows, sizeof *env->begin);
     env->growth = calloc(rows, sizeof *env->growth);
     env->region_row = calloc(rows, 1);

@@ -7,8 +7,8 @@
 #include "renderer/math/warp.h"
 
 enum {
-    /* At most so many regions of cells, for whose choice there is a table for each of the normals
-     * rounded to multiples of 1/NORMAL_STEPS. */
+    /* Largest numbers of rows and columns of regions. Regions are chosen from a table for each unit
+     * normal, rounded to multiples of 1/NORMAL_STEPS. */
     REGION_ROWS = 16,
     REGION_COLUMNS = 32,
     NORMAL_STEPS = 3,
@@ -17,29 +17,30 @@ enum {
 
 struct environment {
     enum environment_kind kind;
-    rgb radiance; /* not image */
+    rgb radiance; /* constant, upper half */
     double total;
     /* Image. Cells are `width` columns, of which column c lies between the centres of texels c-1
      * and c, and height+1 rows, of which the first and the last are half as high. */
     uint32_t width, height;
     rgb *texel;
-    /* By row of cells: sin^2(theta/2) where it begins, which is proportional to the solid angle
-     * from the nearer pole and exact near it, and what it grows by, with theta from the top in the
-     * upper half, from the bottom below it. */
+    /* Per row of cells: sin^2(theta/2) at its upper edge, which is proportional to the solid angle
+     * up to the nearer pole and precise near it, and the growth of that to the lower edge. theta is
+     * taken from the top in the upper half, from the bottom in the lower. */
     float *begin, *growth;
     uint32_t num_rows, num_columns;      /* of regions */
     uint8_t *region_row, *region_column; /* by row and by column of cells */
-    uint32_t row_first[REGION_ROWS + 1], column_first[REGION_COLUMNS + 1]; /* and back */
+    uint32_t row_first[REGION_ROWS + 1], column_first[REGION_COLUMNS + 1]; /* first of a region */
     uint32_t *
-        region_end; /* by normal: of the choice of a row of regions, then of columns, for each row */
+        region_end; /* per normal: steps of the rows of regions, then of the columns in each row */
     uint32_t
-        *row_end; /* by column of regions: of the choice of a row of cells, anew for each region */
+        *row_end; /* per column of regions: steps of the rows of cells, anew for each region */
     float
-        *row_pdf_w; /* likewise: probability of the row over the solid angle of one of its cells */
-    uint32_t *column_end; /* `width` of them per row of cells, anew for each region */
+        *row_pdf_w; /* likewise: probability of the row, divided by the solid angle of one cell */
+    uint32_t *column_end; /* `width` steps per row of cells, anew for each region */
 };
 
-/* Cells, and where in them: 0 at the centres of texels c-1 and row r-1, 1 at c and r. */
+/* Cells, and positions in them: `right` and `down` are 0 at the texel centres of column c-1 and row
+ * r-1, and 1 at those of c and r. */
 struct skyplacev {
     vi row, column;
     vf down, right;
@@ -50,7 +51,7 @@ INLINE rgbv mixv(rgbv a, rgbv b, vf t)
     return rgb_addv(rgb_scalev(a, 1 - t), rgb_scalev(b, t));
 }
 
-/* Between four texels. */
+/* Radiance, interpolated bilinearly between four texels. */
 INLINE rgbv sky_radiance(const struct environment *env, const struct skyplacev *p)
 {
     const vi first = vi_set(0), last = vi_set((int32_t)env->height - 1);
@@ -70,7 +71,7 @@ INLINE rgbv sky_radiance(const struct environment *env, const struct skyplacev *
     return mixv(mixv(c[0], c[1], p->right), mixv(c[2], c[3], p->right), p->down);
 }
 
-/* Of the unit directions of the mask; the others' is some place. */
+/* Places of the unit directions in the lanes of the mask; other lanes get an arbitrary valid place. */
 INLINE struct skyplacev sky_place(const struct environment *env, vec3v w, unsigned mask)
 {
     const int32_t width = (int32_t)env->width, height = (int32_t)env->height;
@@ -84,7 +85,7 @@ INLINE struct skyplacev sky_place(const struct environment *env, vec3v w, unsign
     return p;
 }
 
-/* The table for a normal. */
+/* Number of the table for a unit normal. */
 INLINE vi sky_table(vec3v n)
 {
     vi i[3];
@@ -99,7 +100,7 @@ static inline const uint32_t *sky_regions(const struct environment *env, int32_t
     return env->region_end + (size_t)table * env->num_rows * (1 + env->num_columns);
 }
 
-/* Density with which the table chooses a cell. */
+/* Density, per steradian, of the directions of a cell under a table. */
 static inline float cell_pdf_w(const struct environment *env, int32_t table, uint32_t row,
                                uint32_t column)
 {
@@ -112,13 +113,15 @@ static inline float cell_pdf_w(const struct environment *env, int32_t table, uin
            discrete_probability(env->column_end + (size_t)row * env->width + first, column - first);
 }
 
-/* Choices of a cell, each by a number of the sampler: of the steps of count[i] things, from end[i] on, the thing. */
+/* Discrete choices side by side: thing[i] is the one of count[i] things, with cumulative steps at end[i], that owns
+ * step[i] (discrete.h). */
 struct picks {
     const uint32_t *end[LANES];
     uint32_t count[LANES], step[LANES], thing[LANES];
 };
 
-/* All choices a step of the search at a time, since the machine overlaps what does not wait for each other. */
+/* Makes `num` choices by the numbers u in [0, 1). All searches advance in step, since the processor overlaps look-ups
+ * that do not depend on each other. Uses up count[]. */
 static inline void pick_each(struct picks *p, int num, const float *u)
 {
     uint32_t most = 1;
@@ -135,8 +138,8 @@ static inline void pick_each(struct picks *p, int num, const float *u)
         }
 }
 
-/* Choices of cells for the lanes of the mask; where in them, 0 to 1, and the density: 0, if no
- * light comes to that side. */
+/* Chooses cells for the lanes of the mask, positions in them from 0 to 1 (by what is left of the
+ * numbers that chose the region) and the density. Leaves lanes alone to whose side no light comes. */
 static inline void pick_cells(const struct environment *env, const int32_t table[LANES],
                               const vf u[4], unsigned mask, int32_t row[LANES],
                               int32_t column[LANES], float part[2][LANES], float pdf_w[LANES])
@@ -213,8 +216,8 @@ INLINE void sample_sky(const struct environment *env, vec3v n, const vf u[4], un
     *pdf_w = vf_load_any(pdf);
 }
 
-/* Density of a choice by the cosine with n alone, of the upper half of what is up and of the mirror
- * images of what is down. */
+/* Density of cosine-weighted directions about n; for the upper half, of such directions with those
+ * that point down mirrored up. */
 INLINE vf even_sky_pdf_w(const struct environment *env, vec3v n, vec3v w)
 {
     const vf zero = vf_set(0);
@@ -225,8 +228,8 @@ INLINE vf even_sky_pdf_w(const struct environment *env, vec3v n, vec3v w)
     return vf_select(vf_lt(zero, w.y), density, zero);
 }
 
-/* Directions for surfaces with the unit normals n, by u in [0,1)^4, for the lanes of the mask. pdf_w, per steradian, is 0
- * if no light comes to that side. */
+/* Samples directions for surfaces with unit normals n, by u in [0,1)^4, for the lanes of the mask. *pdf_w, per
+ * steradian, is 0 if no light comes to that side. */
 INLINE void sample_environment_from(const struct environment *env, vec3v n, const vf u[4],
                                     unsigned mask, vec3v *wi, rgbv *radiance, vf *pdf_w)
 {
@@ -242,8 +245,8 @@ INLINE void sample_environment_from(const struct environment *env, vec3v n, cons
     *pdf_w = even_sky_pdf_w(env, n, *wi);
 }
 
-/* Radiance from the unit directions of the mask; and the density with which they are chosen at
- * normals n, unless n is NULL. */
+/* Radiance from the unit directions w, for the lanes of the mask. Unless n is NULL, *pdf_w is the
+ * density with which these are sampled at normals n. */
 INLINE rgbv look_up_environment(const struct environment *env, const vec3v *n, vec3v w,
                                 unsigned mask, vf *pdf_w)
 {

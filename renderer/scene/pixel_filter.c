@@ -38,7 +38,7 @@ static double half_integral(const struct pixel_filter *f, double x)
            x * exp(-0.5 * edge * edge);
 }
 
-/* From where to the radius the share in [0, 1/2] of f lies: by bisection. */
+/* The x in [0, radius] beyond which the share, 0 to 1/2, of f's integral lies; by bisection. */
 static double quantile(const struct pixel_filter *f, double share)
 {
     double lo = 0, hi = f->radius;
@@ -52,7 +52,8 @@ static double quantile(const struct pixel_filter *f, double share)
     return hi;
 }
 
-/* Neighbouring cubics have value and slope in common. The share of a place is then met to 1e-7. */
+/* Interpolates the quantile by cubics whose values and slopes agree where bins meet. The share beyond an
+ * interpolated place is right to 1e-7. */
 static void make_table(struct pixel_filter *f)
 {
     enum { PARTS = 1 << PIXEL_FILTER_BITS };

@@ -7,12 +7,12 @@
 
 enum {
     PIXEL_FILTER_TEXT = 64,
-    /* The table: shares of one side, 2^-25 to 1/2, binned by exponent and PIXEL_FILTER_BITS of
-     * mantissa. */
+    /* Table of the quantile function: shares of one tail, 2^-25 to 1/2, binned by exponent and
+     * PIXEL_FILTER_BITS of mantissa. */
     PIXEL_FILTER_CUBIC = 4,
     PIXEL_FILTER_BITS = 4,
     PIXEL_FILTER_BINS = 24 << PIXEL_FILTER_BITS,
-    PIXEL_FILTER_FIRST = (127 - 25) << PIXEL_FILTER_BITS /* the same bits of 2^-25 */
+    PIXEL_FILTER_FIRST = (127 - 25) << PIXEL_FILTER_BITS /* these bits of 2^-25 */
 };
 #define PIXEL_FILTER_LEAST 0x1p-25f
 
@@ -25,23 +25,23 @@ struct pixel_filter {
     enum pixel_filter_kind kind;
     double radius, sigma; /* pixels; radius 0: the box of one pixel */
     double top;           /* f's factor, so that its integral is 1 */
-    /* How far from the centre the shares of a bin lie, as cubics of the way through it (pixel_filter_simd.h); 1/2 is a
-     * bin, and rows are fetched in pairs. */
+    /* Distances from the centre for the shares of each bin, as cubics in the position within the bin
+     * (pixel_filter_simd.h). Two rows more: of zeros, for 1/2, and since gather_columns() reads a second row. */
     float cubic[PIXEL_FILTER_BINS + 2][PIXEL_FILTER_CUBIC];
 };
 
 extern const char *const pixel_filter_names[]; /* by enum pixel_filter_kind; end with NULL */
 
-/* Radius from 0.5, as less would leave light between the pixels out, to 16; sigma, of Gauss alone,
- * from 0.05 to 8. Fails on any other. */
+/* radius: 0.5 (less would leave out light between the pixels) to 16; sigma, for Gauss only: 0.05 to
+ * 8. Fails outside these ranges. */
 NODISCARD bool pixel_filter_make(struct pixel_filter *f, enum pixel_filter_kind kind, double radius,
                                  double sigma, struct err *e);
-/* "box:1", "tent:1", "gauss:SIGMA:RADIUS"; without a radius box:0.5, tent:1, six sigmas of Gauss. */
+/* "box:1", "tent:1", "gauss:SIGMA:RADIUS". Default radius: box 0.5, tent 1, Gauss six sigmas, at most 16. */
 NODISCARD bool pixel_filter_parse(const char *text, struct pixel_filter *f, struct err *e);
-/* The same text again. */
+/* Writes a text that pixel_filter_parse() reads as this filter. */
 void pixel_filter_print(const struct pixel_filter *f, char text[PIXEL_FILTER_TEXT]);
 
-/* Is it a Gauss that ends at so many sigmas, to a rounding? */
+/* True for a Gauss whose radius is that many sigmas, to 1e-6 pixels. */
 bool pixel_filter_is_gauss(const struct pixel_filter *f, double sigmas);
 
 /* f(x), per pixel. */

@@ -5,8 +5,8 @@
 #include "pixel_filter.h"
 #include "renderer/math/simd.h"
 
-/* The points, from the centre, below which the shares u in [0,1) of f lie, from the table: distributed as f is, so that every
- * sample weighs the same. Not of the box of one pixel. */
+/* Quantile function of f, from the table: the x, in pixels from the centre, below which the share u in [0,1) lies. x is
+ * distributed as f, so that all samples have the same weight. Not for the box of one pixel. */
 INLINE vf filter_places(const struct pixel_filter *f, vf u)
 {
     enum { MANTISSA = 23 - PIXEL_FILTER_BITS };

@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Texture coordinates, of either sign. */
+/* Largest magnitude of a texture coordinate. */
 #define MOST_UV 1e6f
 
 void scene_free(struct scene *s)
@@ -73,7 +73,7 @@ static rgb largest(const struct scene *s, rgb factor, uint32_t map)
     return rgb_mul(factor, is_radiometric(low) ? high : low);
 }
 
-/* The range of what maps make of colours, and that nothing else has one. */
+/* Checks the colours that maps give, and that only matt materials have a reflectance map. */
 static bool check_maps(const struct scene *s, const struct material *m, const char *where,
                        struct err *e)
 {
@@ -124,7 +124,7 @@ static bool check_point(const struct light *l, uint32_t i, const char *where, st
     return true;
 }
 
-/* All lights that do not come from primitives; finds the environment's and counts the dark ones. */
+/* Checks all lights that are not primitives, finds the environment's and counts the dark ones. */
 static bool check_lights(struct scene *s, const char *where, struct err *e)
 {
     s->environment_light = -1;
@@ -166,7 +166,7 @@ static bool check_lights(struct scene *s, const char *where, struct err *e)
     return true;
 }
 
-/* Objects own contiguous runs of primitives, in order and without gaps. */
+/* Checks that objects own contiguous runs of primitives, in order and without gaps. */
 static bool check_objects(const struct scene *s, const char *where, struct err *e)
 {
     uint64_t triangles = 0, spheres = 0;
@@ -252,7 +252,7 @@ static double triangle_area(const vec3 *p)
     return 0.5 * d3_length(d3_cross(d3_sub(d3_of(p[1]), o), d3_sub(d3_of(p[2]), o)));
 }
 
-/* All lights of all emissive objects; the array has room for them. */
+/* Appends the lights of all emissive objects to s->lights, which has room for them. */
 static bool append_area_lights(struct scene *s, const char *where, struct err *e)
 {
     const double pi = 3.14159265358979323846;
@@ -289,7 +289,7 @@ static bool append_area_lights(struct scene *s, const char *where, struct err *e
     return true;
 }
 
-/* tri_light, sphere_light and room in lights for all that may come. */
+/* Allocates tri_light, sphere_light, and room in lights for all area lights. False if out of memory. */
 static bool make_room(struct scene *s)
 {
     size_t most_lights = (size_t)s->num_lights + s->num_objects + s->num_spheres;

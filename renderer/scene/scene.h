@@ -33,8 +33,8 @@ enum material_kind {
     MATERIAL_REFRACTION, /* only the refracted ray; nothing under total reflection */
     MATERIAL_GLASS,      /* smooth dielectric: reflects by Fresnel's equations, refracts the rest */
     MATERIAL_MICROFACET, /* rough conductor */
-    MATERIAL_PLASTIC /* diffuse under a highlight, a rough lobe of one colour at all angles, and a mirror image: their
-                            sum, either may be black */
+    MATERIAL_PLASTIC /* sum of a diffuse lobe, a highlight (a rough lobe whose colour is the same at all angles) and a
+                            mirror image; each may be black */
 };
 /* Sets of material kinds as bit masks (1 << kind), so that code can ask for a property and need not list kinds. */
 enum {
@@ -42,7 +42,7 @@ enum {
     MATERIAL_REFRACTS = 1 << MATERIAL_REFRACTION | 1 << MATERIAL_GLASS,   /* by ior */
     MATERIAL_IS_ROUGH = 1 << MATERIAL_MICROFACET | 1 << MATERIAL_PLASTIC, /* by alpha */
     MATERIAL_IS_MATT = 1 << MATERIAL_DIFFUSE | 1 << MATERIAL_PLASTIC,     /* may have a texture */
-    MATERIAL_SCATTERS = MATERIAL_IS_MATT | MATERIAL_IS_ROUGH /* light sampling finds a lobe */
+    MATERIAL_SCATTERS = MATERIAL_IS_MATT | MATERIAL_IS_ROUGH /* has a lobe with a density */
 };
 
 enum microfacet_kind {
@@ -51,13 +51,13 @@ enum microfacet_kind {
     MICROFACET_BECKMANN_STARTER /* Beckmann's, but for microfacet_g2() (cs184_deviations.h) */
 };
 
-/* Smoother than this is a mirror: float32 hardly tells the normals apart. */
+/* Least alpha of a rough material: below, float32 hardly tells the facets' normals apart. */
 #define MICROFACET_MIN_ALPHA 1e-4f
 
 /* Emission and reflection are independent: an emitter may reflect too. A factor that a kind does
- * not have is 0, and only rough conductors are `conductor`. A map is 1 + the number of a texture
- * that the colour is multiplied by at every place, 0 without one; only diffuse reflectance and
- * radiance have one. */
+ * not have is 0, and only rough conductors have `conductor` set. A map is 1 + the number of the
+ * texture by which the colour is multiplied at every place, or 0 for none; only diffuse reflectance
+ * and radiance may have one. */
 struct material {
     char name[64];
     enum material_kind kind;
@@ -150,9 +150,9 @@ struct scene {
     uint32_t *sphere_material, *sphere_object;
     int32_t *sphere_light;
     uint32_t num_images, num_textures;
-    struct image *images; /* R G B, linear; where they are from is their text SCENE_IMAGE_FILE */
+    struct image *images; /* R G B, linear; attribute SCENE_IMAGE_FILE: the file it was read from */
     struct texture *textures; /* of these images */
-    struct uv *uv; /* 3 per triangle, of use where its material has a map; NULL: no map anywhere */
+    struct uv *uv; /* 3 per triangle, set where its material has a map; NULL: no map anywhere */
     struct material *materials;
     struct light *lights;
     struct object *objects;
@@ -164,20 +164,20 @@ struct scene {
     struct scene_camera *cameras; /* all */
     uint32_t num_cameras;
     vec3 bounds_min, bounds_max; /* of all primitives; 0 if there are none */
-    /* What the assignment's camera is framed on. CGL: the bounds without the rectangles of area
-     * lights, with the meshes that gave way to them; else the bounds. */
+    /* The box that the assignment's camera frames. CGL: bounds of all but the rectangles of area
+     * lights, including the emissive meshes that these replace; else the scene's bounds. */
     vec3 frame_min, frame_max;
     unsigned num_degenerate;   /* triangles without area that were dropped at loading */
     unsigned num_zero_normals; /* corners whose normal in the file had no length; they got the
                                   triangle's own */
     unsigned num_dark_lights;  /* point, spot and directional lights of zero power */
-    unsigned starter;          /* cs184_deviations.h; 0: nothing is done wrong */
+    unsigned starter;          /* bits 1 << enum cs184_deviation; 0: none */
     char note[512];            /* what was merged or left out, one line for the user; else empty */
 };
 
 /* Frees all arrays and zeroes the struct; a zeroed scene is fine. */
 void scene_free(struct scene *s);
-/* Nothing scatters at all. */
+/* The material scatters no light at all. */
 bool material_is_black(const struct material *m);
 
 static inline bool material_has_map(const struct material *m)
@@ -190,21 +190,21 @@ static inline bool material_has_map(const struct material *m)
  * triangles and one for each sphere of each emissive object (in object order), allocates and fills
  * tri_light and sphere_light, fills areas and bounds. `lights` must come from malloc() or be NULL.
  * Fails on an index out of range, objects that are not contiguous, a value that is not finite, a
- * normal not of unit length, a negative reflectance or radiance, a reflectance above 1 (a texture's
- * counts), or a texture on a sphere or a coordinate of it beyond 1e6; `where` starts the line. A scene without
- * primitives is fine. */
+ * normal not of unit length, a negative reflectance or radiance, a reflectance above 1 (times that
+ * of its texture), a texture on a sphere, a texture coordinate beyond 1e6, an emitter without area, or
+ * out of memory; `where` starts the line. A scene without primitives is fine. */
 NODISCARD bool scene_finish(struct scene *s, const char *where, struct err *e);
 
 /* Uses the first camera of that name. False if there is none. */
 NODISCARD bool scene_choose_camera(struct scene *s, const char *name);
 
-/* Adds an environment, and its light behind all others, to a scene that is complete. The scene owns
- * it from then on; on failure (there is one already; out of memory) the caller still does. */
+/* Adds an environment to a finished scene, with its light after all others. The scene then owns it; on
+ * failure (there is one already; out of memory) the caller still does. */
 NODISCARD bool scene_add_environment(struct scene *s, struct environment *env, struct err *e);
-/* The same of a file (environment_read()); each failure is a line with its path. */
+/* The same with an environment read from a file (environment_read()). The error line has its path. */
 NODISCARD bool scene_read_environment(struct scene *s, const char *path, struct err *e);
 
-/* A map (not 0) at barycentric coordinates (b1, b2) of a triangle. */
+/* Value of a map (not 0) at barycentric coordinates (b1, b2) of a triangle. */
 static inline rgb scene_map_at(const struct scene *s, uint32_t map, uint32_t triangle, float b1,
                                float b2)
 {
@@ -216,7 +216,7 @@ static inline uint32_t scene_num_primitives(const struct scene *s)
     return s->num_triangles + s->num_spheres;
 }
 
-/* The box of a primitive. */
+/* Bounding box of a primitive. */
 static inline void scene_primitive_bounds(const struct scene *s, uint32_t prim, vec3 *lo, vec3 *hi)
 {
     if (prim < s->num_triangles) {

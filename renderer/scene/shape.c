@@ -88,8 +88,8 @@ static float max_abs(vec3 p)
     return maxf(fabsf(p.x), maxf(fabsf(p.y), fabsf(p.z)));
 }
 
-/* 32 steps: in the self-hit test of tests/renderer/bvh/test_bvh.c hits end at 1, and a lamp 1 cm under a ceiling
- * is still far. */
+/* 32 float steps: in tests/renderer/bvh/test_bvh.c (no_self_intersection) 1 step already prevents self-hits, and a
+ * lamp 1 cm under a ceiling is still far away. */
 static float coordinate_error(float magnitude)
 {
     return 32 * FLT_EPSILON * maxf(magnitude, FLT_MIN);

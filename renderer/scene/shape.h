@@ -4,12 +4,12 @@
 
 #include "scene.h"
 
-/* Corners by axis, as the intersection wants them. */
+/* Corners p[corner][axis]: the intersection permutes the axes. */
 struct triangle {
     float p[3][3];
 };
 
-/* What takes a ray to the frame where it starts at the origin and runs along axis kz, the one of its
+/* The shear into a frame in which the ray starts at the origin and runs along axis kz, that of its
  * largest component. */
 struct shear {
     float o[3], sx, sy, sz;
@@ -20,14 +20,14 @@ struct shear shape_shear(const ray *r);
 
 /* [Woop13]. s must be the shear of r, whose tmin and tmax may have changed since. If r meets the
  * triangle inside (tmin, tmax): true, with distance t and barycentric coordinates (u, v) of the
- * second and third vertex. Both sides are hit, and the rim counts. Of triangles that share an edge
- * or a vertex bit for bit and close the space around it at least one is hit: no ray slips through a
- * closed mesh. */
+ * second and third vertex. Both sides are hit, and edges count. Where triangles that share an edge or
+ * a vertex bit for bit surround it, a ray through it hits at least one of them: no ray slips through
+ * a closed mesh. */
 bool triangle_intersect(const struct triangle *tri, const ray *r, const struct shear *s, float *t,
                         float *u, float *v);
 
-/* Nearest root inside (tmin, tmax), from outside or inside. The quadratic is solved without
- * cancellation [Haines19, "Precision improvements for ray/sphere intersection"]. */
+/* Nearest hit inside (tmin, tmax), with the origin outside or inside the sphere. The quadratic is
+ * solved without cancellation [Haines19, "Precision improvements for ray/sphere intersection"]. */
 bool sphere_intersect(const struct sphere *s, const ray *r, float *t);
 
 /* Geometry of a hit. */

@@ -2,16 +2,17 @@
 
 #include <stdint.h>
 
-/* Beyond this many images from the first, float32 tells no texels apart. */
+/* Coordinates are clamped to this: further out, float32 tells no texels apart. */
 #define FAR_OUT 1e7f
 
-/* Of u, v, u, v, without a branch: the wraps of neighbouring lookups have nothing to do with each other. */
+/* Vectors hold u, v, u, v. No branches on the wrap modes, which differ unpredictably from look-up to look-up. */
 typedef float f4 __attribute__((vector_size(16)));
 typedef int32_t i4 __attribute__((vector_size(16)));
 
-/* Coordinates are cut to lo .. hi, then whole periods are taken off (0: none), then what lies beyond the fold is turned back about 1:
- * 0 .. 1 but for TEXTURE_BORDER, which may leave it. Texels before the first and behind the last: of these bits of the last one's
- * number, and these; -1 is none. A mirrored neighbour of the outermost texel is that texel. */
+/* Coordinates are clamped to lo .. hi, then whole periods are subtracted (period 0: none), then what is above `fold` is
+ * mirrored about 1; the result is in 0 .. 1 except for TEXTURE_BORDER. With the last texel's number `last`, a texel
+ * before the first becomes (last & before) | none, one after the last (last & behind) | none; -1 is no texel. The
+ * mirror image of the outermost texel is that texel. */
 static const struct {
     float lo, hi, period, inverse, fold;
     int32_t before, behind, none;
@@ -43,7 +44,8 @@ static rgb texel(const struct texture *t, int i, int j)
     return (rgb){p[0], p[1], p[2]};
 }
 
-/* Texels to the left, above, to the right and below of a place, and the shares of the latter two. */
+/* Column to the left, row above, column to the right, row below a place; share[0] and share[1]: weights of the
+ * latter two. */
 struct between {
     i4 texel;
     f4 share;
@@ -58,7 +60,7 @@ static inline struct between place(const struct texture *t, struct uv uv)
     const i4 before = OF_BOTH(before), behind = OF_BOTH(behind), none = OF_BOTH(none);
     const i4 last = {right, bottom, right, bottom}, second = {0, 0, 1, 1};
     f4 x = {uv.u, 1 - uv.v, uv.u, 1 - uv.v}; /* rows come from the top */
-    x = (f4)select4(x > lo, (i4)x, (i4)lo);  /* of NaN, too */
+    x = (f4)select4(x > lo, (i4)x, (i4)lo);  /* NaN: lo */
     x = (f4)select4(x < hi, (i4)x, (i4)hi);
     x -= period * floor4(inverse * x);
     x = (f4)select4(x > fold, (i4)(2 - x), (i4)x);
@@ -108,7 +110,7 @@ double texture_mean_luminance(const struct texture *t, const struct uv c[3], rgb
     const float across = texels_across(t, c);
     const int n = across < MOST ? 1 + (int)across : MOST;
     double sum = 0;
-    /* Rows of triangles that stand, and between them of triangles that hang. */
+    /* Rows of upright triangles with inverted ones between them. */
     for (int i = 0; i < n; i++)
         for (int j = 0; i + j < n; j++) {
             const int parts = i + j + 1 < n ? 2 : 1;
@@ -132,7 +134,7 @@ static rgb extreme(const struct texture *t, float (*of)(float, float))
     return m;
 }
 
-/* NaN, once met, stays. */
+/* A running maximum or minimum that has met a NaN stays NaN. */
 static float larger(float a, float b)
 {
     return a > b || a != a ? a : b;

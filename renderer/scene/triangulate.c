@@ -26,7 +26,8 @@ static bool same(struct point a, struct point b)
     return a.x == b.x && a.y == b.y;
 }
 
-/* Vector area by a fan from the first vertex, and plane coordinates in which it is positive. */
+/* Projects the polygon onto the plane of its vector area (summed over a fan from the first vertex), into
+ * coordinates of about unit size in which its signed area is positive: *area, doubled. */
 static enum triangulate_result project(const dvec3 *p, uint32_t n, struct point *out, double *area)
 {
     dvec3 normal = {0, 0, 0};
@@ -57,8 +58,8 @@ static enum triangulate_result project(const dvec3 *p, uint32_t n, struct point 
     return TRIANGULATE_OK;
 }
 
-/* Do any two edges pass through each other? Touching is no crossing: holes are joined to the rim by
- * an edge that is walked twice. */
+/* True if two edges cross. Touching does not count: holes are joined to the rim by an edge that is
+ * traversed twice. */
 static bool crosses_itself(const struct point *p, uint32_t n)
 {
     for (uint32_t i = 0; i + 2 < n; i++) {
@@ -77,7 +78,7 @@ static bool crosses_itself(const struct point *p, uint32_t n)
     return false;
 }
 
-/* How much of an ear is asked for; each pass takes what the one before could not. */
+/* Which ears are accepted; a later pass is tried only if the earlier ones find none. */
 enum pass {
     PASS_CLEAR, /* a proper corner, its closed triangle free of other vertices */
     PASS_LINE,  /* a vertex on the line between its neighbours: a triangle without area */
@@ -128,7 +129,7 @@ static bool clip(struct ring *r, uint32_t n, uint32_t *index)
         r->next[a] = c;
         r->prev[c] = a;
         left--;
-        /* Every other corner next keeps the triangles of a round polygon from being slivers. */
+        /* Going on with every other corner keeps the triangles of a round polygon from being slivers. */
         v = r->next[c];
     }
     *index++ = r->prev[v];
@@ -173,7 +174,7 @@ enum triangulate_result triangulate(const dvec3 *p, uint32_t n, uint32_t *index)
     }
     if (!clip(&r, n, index))
         goto done;
-    /* The signed areas add up by themselves; that none is negative is what has to be seen. */
+    /* Signed areas always add up to the polygon's; their magnitudes do only if none is negative. */
     double sum = 0;
     for (uint32_t i = 0; i < n - 2; i++)
         sum += fabs(orient(q[index[3 * i]], q[index[3 * i + 1]], q[index[3 * i + 2]]));

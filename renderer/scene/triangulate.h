@@ -1,4 +1,4 @@
-/* Simple polygons into triangles. */
+/* Splits simple polygons into triangles. */
 #ifndef ASSAY_TRIANGULATE_H
 #define ASSAY_TRIANGULATE_H
 
@@ -11,7 +11,7 @@ enum triangulate_result {
     TRIANGULATE_OK,
     TRIANGULATE_FLAT,    /* all vertices on a line: the triangles have no area */
     TRIANGULATE_CROSSED, /* its edges cross each other: a fan from p[0] */
-    TRIANGULATE_MEMORY
+    TRIANGULATE_MEMORY   /* out of memory: index is not set */
 };
 
 /* Splits the polygon p[0..n-1] (n >= 3, convex or not, about planar, either winding, holes joined

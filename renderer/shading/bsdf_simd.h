@@ -14,7 +14,7 @@
 /* Closer to the surface than this, squares of cosines leave the range of float32. */
 #define LOWEST_COS 1e-15f
 
-/* Materials of lanes. */
+/* The material of each lane. Of plastic, ior, transmittance and k are what scene_simd.h says. */
 struct materialv {
     vi bits, facets;
     rgbv reflectance, transmittance, eta, k; /* plastic: reflectance is that of its facets */
@@ -26,7 +26,7 @@ INLINE vi has_bits(vi a, int which)
     return ~vi_eq(a & which, vi_set(0));
 }
 
-/* From their records and numbers. */
+/* Fetches the materials of these numbers from their records. */
 INLINE void materials_gather(const float *record, const int32_t number[LANES], struct materialv *m)
 {
     vf w[2][COLUMNS];
@@ -43,15 +43,15 @@ INLINE void materials_gather(const float *record, const int32_t number[LANES], s
     m->reflectance = rgb_select(has_bits(m->bits, 1 << MATERIAL_PLASTIC), m->eta, m->reflectance);
 }
 
-/* Sampled directions. weight = f |cos(theta_i)| / pdf_w, so the caller multiplies and is done.
+/* Sampled directions. weight = f |cos(theta_i)| / pdf_w: the caller only multiplies by it.
  * pdf_w 0: nothing scatters (the path ends). */
 struct bsdf_samplev {
     vec3v wi;
     rgbv weight;
     vf pdf_w; /* per steradian; 1 if delta */
-    vf eta2; /* what the radiance behind a refracting boundary is divided by, (n_behind / n_here)^2; 1 else. It is in
-                 weight, and leaves it again where the path comes out. */
-    vi delta; /* one of the directions that light sampling cannot find */
+    vf eta2; /* factor by which weight divides radiance from behind a refracting boundary, (n_behind / n_here)^2; else
+                 1. The product along a path is 1 again where it leaves the glass. */
+    vi delta; /* sampled from a delta lobe, which light sampling cannot find */
 };
 
 INLINE rgbv mirror_reflectance(const struct materialv *m, vf cos_m)
@@ -65,8 +65,8 @@ INLINE rgbv mirror_reflectance(const struct materialv *m, vf cos_m)
     return rgb_select(conductor, f, m->reflectance);
 }
 
-/* Normals are sampled; a solid angle of them is 4 wo.m times as large in mirrored directions
- * [Walter07 eq. 14], which cancels with the cosine in their density. *d: the density of normals. */
+/* Density of wi when visible normals h are sampled: mirroring at h magnifies solid angle by 4 wo.h
+ * [Walter07 eq. 14], which cancels the cosine in the density of h. *d: D(h). */
 INLINE vf pdf_microfacet(vi kind, vf alpha, vec3v wo, vec3v wi, vec3v h, vf *d)
 {
     vi low = vf_lt(wo.z, vf_set(LOWEST_COS)) | vf_lt(wi.z, vf_set(LOWEST_COS));
@@ -124,8 +124,8 @@ INLINE void sample_mirror(vi lanes, vec3v wo, rgbv weight, struct bsdf_samplev *
     sample_delta(lanes, v3v(-wo.x, -wo.y, wo.z), weight, vf_set(1), s);
 }
 
-/* Glass, and refraction alone. eta: index behind over index here. Radiance is bundled by eta^2 behind the
- * boundary, so what comes out of there is divided by it [Veach97 5.2]. */
+/* Glass, and refraction without reflection. eta: index behind over index on the side of wo. Radiance is
+ * larger by eta^2 behind the boundary, so radiance that comes from there is divided by it [Veach97 5.2]. */
 INLINE void sample_dielectric(const struct materialv *m, vi lanes, vi front, vec3v wo, vf lobe,
                               struct bsdf_samplev *s)
 {
@@ -148,7 +148,7 @@ INLINE rgbv eval_diffuse(rgbv reflectance)
     return rgb_scalev(reflectance, vf_set(INV_PI_F));
 }
 
-/* f, and the density of wi, of the lanes whose material is not diffuse alone. diffuse: f of a diffuse part. */
+/* f, and the density of wi, for lanes whose material is not purely diffuse. diffuse: f of the diffuse part. */
 INLINE rgbv eval_lobes(const struct materialv *m, vi lanes, rgbv diffuse, vec3v wo, vec3v wi,
                        vf *pdf_w)
 {
@@ -164,8 +164,8 @@ INLINE rgbv eval_lobes(const struct materialv *m, vi lanes, rgbv diffuse, vec3v 
     return rgb_select(plastic, rgb_addv(f, diffuse), f);
 }
 
-/* Picks one of its lobes by its share; the weight counts both lobes that are not the mirror. On entry s holds a
- * direction of the diffuse lobe. */
+/* Picks one lobe with the probability of its share. Outside the mirror, weight and density are those of the diffuse and
+ * the rough lobe together. On entry s holds a direction of the diffuse lobe. */
 INLINE void sample_plastic(const struct materialv *m, vi lanes, rgbv reflectance, vec3v wo,
                            const vf u[4], struct bsdf_samplev *s)
 {
@@ -183,9 +183,9 @@ INLINE void sample_plastic(const struct materialv *m, vi lanes, rgbv reflectance
     sample_mirror(mirrored, wo, rgb_scalev(m->k, 1 / mirror), s);
 }
 
-/* Samples directions for the lanes of the mask; other lanes are undefined. number, kinds and reflectance: of their
- * materials; front: 1 where wo is on the side of the scene's geometric normal (outside glass), else 0. u[0] and u[1]
- * choose the direction, u[2] the lobe. */
+/* Samples directions for the lanes of the mask; other lanes are undefined. number, kinds (bits) and reflectance: of the
+ * lanes' materials; front: true where wo is on the side of the scene's geometric normal (outside glass). u[0] and
+ * u[1] choose the direction, u[2] the lobe. */
 INLINE void sample_lobes(const float *record, const int32_t number[LANES], vi kinds,
                          rgbv reflectance, const bool *front, unsigned mask, vec3v wo,
                          const vf u[4], struct bsdf_samplev *s)

@@ -21,8 +21,8 @@ INLINE vf fresnel_dielectric(vf cos_i, vf eta, vf *cos_t)
                      0.5f * (parallel * parallel + perpendicular * perpendicular));
 }
 
-/* Schlick's approximation of it, in the cosine on the side of incidence, whichever that is, as the
- * assignment uses it [Schlick94]. Total reflection is still total. */
+/* Schlick's approximation of it [Schlick94], always in the cosine on the side of incidence, as in the
+ * assignment, even if that is the denser side. Total reflection stays total. */
 INLINE vf fresnel_schlick(vf cos_i, vf eta, vf *cos_t)
 {
     vi total = vf_eq(fresnel_dielectric(cos_i, eta, cos_t), vf_set(1));

@@ -26,7 +26,7 @@ static const struct material *material_of(const struct scene *s, const struct li
                                                     : s->sphere_material[l->first]];
 }
 
-/* Luminance of triangle i of a textured light, a mean. */
+/* Mean luminance of triangle i of a textured light. */
 static double texture_luminance(const struct scene *s, const struct light *l, uint32_t i)
 {
     const struct material *m = material_of(s, l);
@@ -34,7 +34,7 @@ static double texture_luminance(const struct scene *s, const struct light *l, ui
                                   s->uv + 3 * (size_t)(l->first + i), m->radiance);
 }
 
-/* The same of all its triangles. */
+/* Mean luminance of an area light over its area. */
 static double light_luminance(const struct scene *s, const struct light *l)
 {
     double sum = 0, area = 0;
@@ -48,13 +48,14 @@ static double light_luminance(const struct scene *s, const struct light *l)
     return sum / area;
 }
 
-/* How much more often than by its area triangle i is chosen; its mean over the area is 1. mean: light_luminance(). */
+/* Factor by which triangle i is chosen more often than in proportion to its area; its mean over the area is 1. mean:
+ * light_luminance(). */
 static double triangle_weight(const struct scene *s, const struct light *l, uint32_t i, double mean)
 {
     return l->textured && mean > 0 ? 0.1 + 0.9 * texture_luminance(s, l, i) / mean : 1;
 }
 
-/* A row for each light, records of the triangles of all. */
+/* Fills a row for each light and a record for each triangle of the lights. False if out of memory. */
 static bool build_records(struct light_table *t, const struct scene *s)
 {
     uint32_t num = 0;
@@ -87,7 +88,7 @@ static bool build_records(struct light_table *t, const struct scene *s)
     return true;
 }
 
-/* Of a light's triangles: the sphere, the cone, and what they send along its axis. */
+/* Bounds of a light's triangles: their sphere, the cone of their normals, and their value along its axis. */
 static void bound_triangles(const struct scene *s, const struct light *l, struct light_bounds *b)
 {
     const vec3 *p = s->position + 3 * (size_t)l->first;
@@ -105,7 +106,7 @@ static void bound_triangles(const struct scene *s, const struct light *l, struct
     b->axis = flat > 0 ? scale(facing, 1 / flat) : b->axis;
     for (uint32_t i = 0; i < 3 * l->count; i++)
         b->radius = maxf(b->radius, length(sub(p[i], b->centre)));
-    /* A closed surface shows a quarter of itself on the average, a leaf that shines on both sides half. */
+    /* Mean projected area: a quarter of a closed surface, half of a sheet that emits on both sides. */
     const bool both_sides = material_of(s, l)->radiance_both_sides;
     b->value *= both_sides ? 0.5 : (double)maxf(flat, 0.25f);
     b->angle = both_sides || !(flat > 0) ? PI_F : 0;
@@ -115,7 +116,8 @@ static void bound_triangles(const struct scene *s, const struct light *l, struct
     }
 }
 
-/* For the choice: the luminance of the irradiance from it on what faces it, and how that falls off. */
+/* Bounds for choosing among lights. Their value is the luminance of the light's irradiance on a surface that faces it,
+ * before the falloff. */
 static struct light_bounds light_bounds(const struct scene *s, const struct light *l)
 {
     struct light_bounds b = {.near = true,
@@ -140,7 +142,7 @@ static struct light_bounds light_bounds(const struct scene *s, const struct ligh
         b.falloff[1] = b.falloff[2] = 0;
         b.centre = l->to_light;
         if (l->kind == LIGHT_ENVIRONMENT) {
-            /* All around, sqrt(2) of it by light_choice_simd.h; a plane gets a quarter on the average. */
+            /* All around, where cluster_weight() is sqrt(2) value; a plane receives a quarter on average. */
             b.value = environment_total(s->environment) / 4 / sqrt(2);
             b.radius = 2;
         }
@@ -150,7 +152,7 @@ static struct light_bounds light_bounds(const struct scene *s, const struct ligh
     }
     const struct material *m = material_of(s, l);
     double mean = light_luminance(s, l);
-    /* What the mean has missed must still be chosen some time. */
+    /* Bright texels that the mean has missed must keep some probability. */
     if (l->textured)
         mean = fmax(mean, 1e-3 * rgb_luminance(rgb_mul(
                                      m->radiance, texture_max(&s->textures[m->radiance_map - 1]))));
@@ -168,7 +170,7 @@ static struct light_bounds light_bounds(const struct scene *s, const struct ligh
     return b;
 }
 
-/* Over all lights, or those that are delta lights; NULL if out of memory. */
+/* Clusters of all lights, or of the delta lights only; NULL if out of memory. */
 static struct light_clusters *build_choice(const struct scene *s, bool only_delta)
 {
     struct light_bounds *b = malloc(((size_t)s->num_lights + 1) * sizeof *b);

@@ -12,16 +12,16 @@
 
 #include "renderer/scene/scene.h"
 
-/* With more lights than this, a sample goes to one of them chosen by place, not to each. */
+/* With more lights than this, a vertex samples lights chosen for its place instead of every light. */
 enum { MANY_LIGHTS = 16 };
 
 struct light_table; /* per-scene tables for choosing lights and triangles */
 
-/* NULL on failure (out of memory, more lights than DISCRETE_MOST). Refers to the scene. */
+/* NULL on failure (out of memory, more lights than DISCRETE_MOST). The scene must outlive the table. */
 NODISCARD struct light_table *light_table_build(const struct scene *s, struct err *e);
 void light_table_free(struct light_table *t);
 
-/* Area lights and environment. */
+/* Number of lights that are not delta lights: area lights and the environment. */
 uint32_t light_count_areas(const struct light_table *t);
 
 static inline bool light_is_delta(const struct light *l)

@@ -5,7 +5,7 @@
 
 #include <stdlib.h>
 
-/* Lights lo .. hi-1 of an order, and where to cut them: beyond `middle` along the longest of the keys. */
+/* Lights order[lo .. hi-1], and where to split them: at `middle` of the key that varies most. */
 struct group {
     uint32_t lo, hi;
     int key;
@@ -15,10 +15,10 @@ struct group {
 struct builder {
     const struct light_bounds *b;
     uint32_t *order;
-    double size; /* extent of the lights: as far as a turn by a radian */
+    double size; /* extent of the lights; counts as much as a turn by a radian */
 };
 
-/* Place and direction; what is infinitely far is furthest of all from what is not. */
+/* Keys: place (3), direction (3), and whether infinitely far, which separates lights most. */
 enum { KEYS = 7 };
 static double key_of(const struct builder *w, uint32_t light, int key)
 {
@@ -45,7 +45,7 @@ static struct group group_of(const struct builder *w, uint32_t lo, uint32_t hi)
     return g;
 }
 
-/* Puts what is beyond the middle last; where that begins. */
+/* Moves the lights beyond the middle to the end and returns where these begin; if a part would be empty, half-way. */
 static uint32_t cut_group(struct builder *w, const struct group *g)
 {
     uint32_t lo = g->lo, hi = g->hi;
@@ -61,7 +61,8 @@ static uint32_t cut_group(struct builder *w, const struct group *g)
     return lo > g->lo && lo < g->hi ? lo : g->lo + (g->hi - g->lo) / 2;
 }
 
-/* Cuts the widest until there are as many as may be; they stay in order, so that neighbours are. */
+/* Splits the widest group until there are MOST_CLUSTERS. Parts stay side by side, so that groups that are near each
+ * other remain neighbours. Returns the number of groups. */
 static int build_groups(struct builder *w, uint32_t num_lights, struct group *group)
 {
     int num = 1;
@@ -83,7 +84,7 @@ static int build_groups(struct builder *w, uint32_t num_lights, struct group *gr
     return num;
 }
 
-/* Around all lights of a group. */
+/* Fills *c with bounds of all lights of a group. all: the value of all lights. */
 static void fill_cluster(const struct builder *w, const struct group *g, double all,
                          struct light_cluster *c)
 {
@@ -128,7 +129,7 @@ static void fill_cluster(const struct builder *w, const struct group *g, double 
                                .value = (float)(value / all)};
 }
 
-/* To lengths in units of the extent, and the value at that distance. */
+/* Rescales the falloff to lengths in units of `size`, so that it is 1 at that distance, and `value` to match. */
 static void scale_falloff(struct light_bounds *b, double size)
 {
     double f[3] = {b->falloff[0], size * (double)b->falloff[1],

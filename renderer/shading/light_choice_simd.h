@@ -1,5 +1,5 @@
-/* Many lights (light_choice.h), by lanes: in proportion to about the irradiance (its luminance) that
- * comes from a light; never one that sends nothing to the side of the normal. */
+/* Chooses among many lights (light_choice.h), by lanes: about in proportion to the luminance of the
+ * irradiance from a light; never one that sends nothing to the side of the normal. */
 #ifndef ASSAY_LIGHT_CHOICE_SIMD_H
 #define ASSAY_LIGHT_CHOICE_SIMD_H
 
@@ -10,19 +10,19 @@
 /* Lengths are in units of the lights' extent. */
 struct light_cluster {
     vec3 centre, axis;
-    float near; /* what places are multiplied by: 0 where the lights are infinitely far */
+    float near; /* scale of the receiver's place; 0 if the lights are infinitely far */
     float radius,
-        blur2;    /* blur2: half of its square, by which distances grow so that none is too near */
-    float spread; /* cos(a - angle) - cos(a) is no more than this */
+        blur2;    /* half of radius^2, added to squared distances so that none is too small */
+    float spread; /* upper bound of cos(a - angle) - cos(a) */
     float reach, even, falloff[3], value;
 };
 
 struct light_clusters {
     int num;
     struct light_cluster cluster[MOST_CLUSTERS];
-    uint32_t first[MOST_CLUSTERS + 1]; /* its lights' places */
-    uint32_t *light, *end;             /* by place: a light; of the choice within its cluster */
-    uint32_t *place;                   /* by light: and back */
+    uint32_t first[MOST_CLUSTERS + 1]; /* cluster k has places first[k] .. first[k + 1] - 1 */
+    uint32_t *light, *end;             /* by place: light; steps of the choice in its cluster */
+    uint32_t *place;                   /* by light; UINT32_MAX: never chosen */
 };
 
 /* The weight of a cluster at p with the normal n. */
@@ -31,7 +31,8 @@ INLINE vf cluster_weight(const struct light_cluster *c, vec3v p, vec3v n)
     const vf zero = vf_set(0);
     const vec3v to = subv(v3_all(c->centre), scalev(p, vf_set(c->near)));
     const vf d2 = dotv(to, to) + c->blur2, d = vf_sqrt(d2);
-    /* No part of the sphere is higher above the surface, or further ahead of the light; nor is what rounding hides. */
+    /* Upper bounds over the sphere, rounding included, of the height above the surface and of the distance ahead of the
+     * light. */
     const vf reach = c->radius + 1e-5f * d;
     const vf height = dotv(n, to) + reach,
              ahead = reach + c->spread * d - dotv(v3_all(c->axis), to);
@@ -42,8 +43,8 @@ INLINE vf cluster_weight(const struct light_cluster *c, vec3v p, vec3v n)
     return vf_select(lit, vf_min(w, vf_set(1e30f)), zero);
 }
 
-/* A cluster for each lane, 0 <= u < 1, its weight and that of all: 0, if none sends anything. *rest: what is left of u,
- * 0 to 1. */
+/* Chooses a cluster for each lane by 0 <= u < 1. *weight: its weight; *all: the sum of all weights, 0 if none sends
+ * anything; *rest: position of u within the choice, 0 to 1. */
 INLINE vi choose_cluster(const struct light_clusters *t, vec3v p, vec3v n, vf u, vf *weight,
                          vf *all, vf *rest)
 {
@@ -52,7 +53,7 @@ INLINE vi choose_cluster(const struct light_clusters *t, vec3v p, vec3v n, vf u,
         sum = sum + cluster_weight(&t->cluster[i], p, n);
         upto[i] = sum;
     }
-    /* Below it even where rounding makes it as much. */
+    /* Below the sum, even where rounding makes them equal. */
     const vf target = vf_min(u * sum, sum * (1 - 0x1p-24f));
     vf before = vf_set(0), there = sum;
     vi taken = vi_set(0);
@@ -68,7 +69,8 @@ INLINE vi choose_cluster(const struct light_clusters *t, vec3v p, vec3v n, vf u,
     return taken;
 }
 
-/* A light of a cluster, and with what probability. 0 <= *u < 1, likewise. */
+/* Chooses a light of a cluster by 0 <= *u < 1, which becomes the position within the choice. *probability: within the
+ * cluster. */
 static inline uint32_t choose_in_cluster(const struct light_clusters *t, int cluster, float *u,
                                          float *probability)
 {
@@ -82,7 +84,8 @@ static inline uint32_t choose_in_cluster(const struct light_clusters *t, int clu
     return t->light[first + i];
 }
 
-/* The probability that these two have for a light at p with the normal n, where `all` is the weight of all. */
+/* Probability with which choose_cluster() and choose_in_cluster() choose a light at p with normal n. all: as given by
+ * choose_cluster() there. */
 static inline float chosen_probability(const struct light_clusters *t, uint32_t light, vec3 p,
                                        vec3 n, float all)
 {

@@ -9,11 +9,11 @@
 #include "renderer/scene/environment_simd.h"
 
 enum {
-    /* Up to so many triangles of a light are looked through one by one. */
+    /* A light of up to this many triangles is searched linearly. */
     FEW_TRIANGLES = 8,
-    /* Words of the record of a light's triangle: corner, two edges, normal, then the area up to and
-     * including it, each triangle's times its weight, and its weight: 1, or how much more often it
-     * is chosen for its texture. */
+    /* Words of the record of a light's triangle: corner, two edges, normal, the sum of area times
+     * weight over the light's triangles up to this one, and its weight: 1, or the factor by which
+     * its texture makes it be chosen more often. */
     LAMP_AREA = 12,
     LAMP_WEIGHT = 13,
     LAMP_WORDS = 16
@@ -23,9 +23,9 @@ enum {
 struct light_row {
     rgb radiance;
     float pdf_a;
-    int32_t both_sides;        /* lanes of truth */
-    int32_t first, untextured; /* its first record; how many it has, 0 with a texture */
-    float area;                /* as its last record says */
+    int32_t both_sides;        /* a lane mask: -1 or 0 */
+    int32_t first, untextured; /* first record; number of records, 0 if textured or a sphere */
+    float area;                /* LAMP_AREA of its last record */
 };
 
 struct light_table {
@@ -87,7 +87,7 @@ static inline bool is_lamp(const struct light *light)
     return light->kind == LIGHT_TRIANGLES && light->count <= FEW_TRIANGLES && !light->textured;
 }
 
-/* pdf_w and direction for a place on an area light of density pdf_a there. */
+/* Fills a sample of the place `to` on an area light, which is sampled with density pdf_a there. */
 INLINE void finish_area_sample(const struct lamp *l, vec3v from, vec3v to, vec3v normal,
                                struct light_samplev *s)
 {
@@ -115,7 +115,7 @@ INLINE void sample_triangle(const struct lamp *l, const vf q[LAMP_AREA], vec3v p
     finish_area_sample(l, p, to, v3v(q[9], q[10], q[11]), out);
 }
 
-/* Of few triangles. */
+/* Samples a light of few triangles. */
 INLINE void sample_lamp(const struct lamp *l, vec3v p, const vf u[4], struct light_samplev *out)
 {
     const float *r = l->record;
@@ -131,7 +131,7 @@ INLINE void sample_lamp(const struct lamp *l, vec3v p, const vf u[4], struct lig
     sample_triangle(l, q, p, u, out);
 }
 
-/* The triangle of `count` within whose area the target lies, as discrete_pick(). */
+/* Index of the triangle, of `count`, in whose part of the cumulative areas the target lies; like discrete_pick(). */
 static inline int lamp_search(const float *record, int count, float target)
 {
     int at = 0;
@@ -142,7 +142,7 @@ static inline int lamp_search(const float *record, int count, float target)
     return at;
 }
 
-/* Of many triangles; number: which. */
+/* Samples a light of many triangles. number: the sampled triangle of each lane. */
 INLINE void sample_mesh(const struct lamp *l, vec3v p, const vf u[4], int32_t number[LANES],
                         struct light_samplev *out)
 {
@@ -155,8 +155,8 @@ INLINE void sample_mesh(const struct lamp *l, vec3v p, const vf u[4], int32_t nu
     sample_triangle(l, q, p, u, out);
 }
 
-/* Samples of a light of each lane, which may be another's, for lanes of the mask whose lights are triangles without a
- * texture; which these are. */
+/* Samples a light per lane, for the lanes of the mask whose lights are triangles without a texture. Returns the mask of
+ * these lanes. */
 INLINE unsigned sample_lamps(const struct light_table *t, const uint32_t light[LANES], vec3v p,
                              const vf u[4], unsigned mask, struct light_samplev *out)
 {
@@ -181,7 +181,7 @@ INLINE unsigned sample_lamps(const struct light_table *t, const uint32_t light[L
     return mask;
 }
 
-/* Of triangles with a texture. */
+/* Samples a light of triangles with a texture. */
 static __attribute__((noinline)) void sample_textured(const struct scene *s,
                                                       const struct light *light,
                                                       const struct lamp *l, vec3v p, const vf u[4],
@@ -210,7 +210,8 @@ INLINE vf cone_one_minus_cos(vf r2, vf d2)
     return sin2 / (1 + vf_sqrt(vf_max(vf_set(0), 1 - sin2)));
 }
 
-/* Outside and not so near that the cone is a half space: there the cone, else the area. */
+/* Lanes that are outside the sphere and not so near that the cone becomes a half space. These sample the cone, others
+ * the area. */
 INLINE vi uses_cone(vf radius, vf d2)
 {
     return vf_lt(1.0001f * radius * radius, d2);
@@ -243,7 +244,7 @@ INLINE void sample_sphere(const struct scene *s, const struct light *light, cons
     *out = light_sample_select(cone, out, &area);
 }
 
-/* And spots. */
+/* Samples a point or spot light. */
 INLINE void sample_point(const struct light *light, vec3v p, unsigned mask,
                          struct light_samplev *out)
 {
@@ -276,7 +277,7 @@ INLINE void sample_directional(const struct light *light, struct light_samplev *
     out->delta = vi_set(-1);
 }
 
-/* cs184_deviations.h: the sample as the assignment's starter code makes it of ours. */
+/* Turns a sample of ours into that of the assignment's starter code (cs184_deviations.h). */
 INLINE void as_starter(const struct scene *s, const struct light *light, const struct lamp *l,
                        vec3v p, struct light_samplev *out)
 {
@@ -292,8 +293,8 @@ INLINE void as_starter(const struct scene *s, const struct light *light, const s
             vf_select(vf_lt(vf_set(0), out->pdf_w), out->pdf_w / out->distance, out->pdf_w);
 }
 
-/* Samples of light l as seen from p, where the unit normal is n, which the environment goes by, for the lanes of the
- * mask; the others' are of no use. u in [0,1)^4. */
+/* Samples light l as seen from p, for the lanes of the mask; other lanes are undefined. n: unit normals there, used by
+ * the environment only. u in [0,1)^4. */
 INLINE void sample_light_from(const struct light_table *t, uint32_t l, vec3v p, vec3v n,
                               const vf u[4], unsigned mask, struct light_samplev *out)
 {
@@ -327,8 +328,8 @@ INLINE void sample_light_from(const struct light_table *t, uint32_t l, vec3v p, 
     }
 }
 
-/* The density with which area lights would have sampled places of the normals ng on primitives `prim`, found from p along
- * unit wi at the distances d, for the lanes of the mask. */
+/* Density, per steradian at p, with which sampling the area lights `light` would give the unit directions wi, which hit
+ * primitives `prim` with normals ng at the distances d; for the lanes of the mask. */
 INLINE vf pdf_of_light(const struct light_table *t, const int32_t light[LANES],
                        const uint32_t prim[LANES], vec3v p, vec3v wi, vf d, vec3v ng, unsigned mask)
 {

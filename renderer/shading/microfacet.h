@@ -12,6 +12,7 @@
 
 #define MICROFACET_SQRT_PI 1.77245385090551602730f
 
+/* Mask, as of bits(), of the lanes with a Beckmann distribution. */
 INLINE unsigned microfacet_beckmanns(vi kind)
 {
     return bits(~vi_eq(kind, vi_set(MICROFACET_GGX)));
@@ -27,7 +28,7 @@ INLINE vf microfacet_d(vi kind, vf alpha, vec3v m)
     unsigned beckmann = microfacet_beckmanns(kind);
     if (beckmann) {
         e = sin2 / (cos2 * a2);
-        /* The exponential is 0 there, and cos2 may be. */
+        /* Beyond 87 the exponential is 0, and cos2 may be 0. */
         vi near = vf_lt(e, vf_set(87));
         vf b = exp_negative(-e) * INV_PI_F / (a2 * cos2 * cos2);
         d = vf_select(lanes_of(beckmann), vf_select(near, b, vf_set(0)), d);
@@ -75,7 +76,8 @@ INLINE vf microfacet_g2(vi kind, vf alpha, vi separable, vec3v wo, vec3v wi)
     return g;
 }
 
-/* Visible normals of a hemisphere seen from wo, stretched back [Heitz18, section 3]. */
+/* Samples the normals of a hemisphere that are visible from wo, in stretched space, and stretches them back [Heitz18,
+ * section 3]. */
 INLINE vec3v microfacet_sample_ggx(vf alpha, vec3v wo, vf u, vf v)
 {
     const vf zero = vf_set(0);
@@ -94,7 +96,8 @@ INLINE vec3v microfacet_sample_ggx(vf alpha, vec3v wo, vf u, vf v)
     return normalizev(v3v(alpha * n.x, alpha * n.y, vf_max(vf_set(1e-7f), n.z)));
 }
 
-/* Integral of (1 - s t) exp(-s^2) over s < x; e = exp(-x^2): the slopes towards a viewer at tan(theta) = t. */
+/* Integral of (1 - s t) exp(-s^2) over s < x: up to a factor, the share of slopes below x that a viewer at
+ * tan(theta) = t sees. e: exp(-x^2). */
 INLINE vf microfacet_slope_integral(vf x, vf t, vf e)
 {
     vf tail = e * exp_erfcx(vf_abs(x));
@@ -104,13 +107,13 @@ INLINE vf microfacet_slope_integral(vf x, vf t, vf e)
 
 /* The slope s at which the integral of (1 - s t) exp(-s^2) is the fraction u of what a viewer at
  * tan(theta) = t sees of all slopes; t = 0 gives a normal variate of variance 1/2. Newton's method
- * inside a shrinking bracket; `lanes` are wanted. A step of 2e-4 is the last: the next would be of
- * its square, which rounding does not let be seen. u is met to 4e-7. */
+ * inside a shrinking bracket, for the lanes of the mask `lanes`. A step below 2e-4 is the last: the
+ * remaining error is of the order of its square, below rounding. u is reproduced to 4e-7. */
 INLINE vf microfacet_slope(unsigned lanes, vf t, vf u)
 {
     const vf zero = vf_set(0), top = vf_set(6);
     vf lo = -top, hi = vf_select(vf_lt(1 / top, t), 1 / t, top), y = 2 * u - 1;
-    /* About there: the inverse error function's series, less what a slant takes. */
+    /* First guess: the series of the inverse error function, reduced for a slanting view. */
     vf x = 0.8862f * y * (1 + 0.26f * y * y) - (1 - 1 / (t + 1)) * (0.7f + 0.45f * u);
     x = vf_min(x, 0.9f * hi);
     vf all = microfacet_slope_integral(hi, t, exp_negative(-hi * hi));
@@ -129,7 +132,7 @@ INLINE vf microfacet_slope(unsigned lanes, vf t, vf u)
     return x;
 }
 
-/* Slopes along wo and across. */
+/* Samples the slopes along wo and across it. */
 INLINE vec3v microfacet_sample_beckmann(unsigned lanes, vf alpha, vec3v wo, vf u, vf v)
 {
     const vf zero = vf_set(0);

@@ -28,7 +28,7 @@ static void set_int(float *to, int32_t i)
 static void fill_triangle(const struct scene *s, uint32_t i, float *r)
 {
     const vec3 *p = s->position + 3 * (size_t)i;
-    /* What does not depend on the place comes from surface_at() itself. */
+    /* Whatever does not depend on the hit point is taken from surface_at() itself. */
     const ray none = {.d = {0, 0, 1}};
     const struct surface at = surface_at(s, i, &none, 0, 0, 0);
     set3(r + RECORD_P, p[0]);
@@ -54,7 +54,8 @@ static void fill_sphere(const struct scene *s, uint32_t i, float *r)
     set_int(r + RECORD_LIGHT, s->sphere_light[i]);
 }
 
-/* A lobe is sampled in proportion to its largest colour: no direction has then more weight than all three together. */
+/* A lobe is sampled in proportion to its largest channel, so that no sample weighs more than the three largest channels
+ * together. */
 static void set_plastic(const struct material *m, float r[MATERIAL_WORDS])
 {
     const float highlight = rgb_max(m->specular), mirror = rgb_max(m->mirror);
@@ -86,7 +87,7 @@ void scene_simd_material(const struct material *m, float r[MATERIAL_WORDS])
 struct scene_simd *scene_simd_build(const struct scene *s, struct err *e)
 {
     struct scene_simd *l = calloc(1, sizeof *l);
-    /* What meets nothing reads the first. */
+    /* Lanes whose rays hit nothing read the first record, so there has to be one. */
     const size_t words = RECORD_WORDS * ((size_t)scene_num_primitives(s) + 1);
     if (l != NULL) {
         l->primitive = huge_alloc(words * sizeof *l->primitive);

@@ -17,7 +17,7 @@ enum {
     RECORD_OUT = 4,
     RECORD_EPS = 21,
     RECORD_MATERIAL = 22, /* number, as an integer's bits */
-    RECORD_LIGHT = 23,    /* as well; -1: none */
+    RECORD_LIGHT = 23,    /* likewise; -1: none */
     RECORD_WORDS = 24
 };
 
@@ -32,11 +32,11 @@ enum {
     MATERIAL_K = 12,
     MATERIAL_FACETS = 15, /* enum microfacet_kind, as an integer's bits */
     MATERIAL_WORDS = 16,
-    /* Of plastic, in the place of what it does not have; shares: of the directions that are sampled. */
+    /* Of plastic, in words that it does not use otherwise. Shares: probabilities of sampling the lobe. */
     MATERIAL_MIRROR_SHARE = MATERIAL_IOR,
     MATERIAL_HIGHLIGHT_SHARE = MATERIAL_TRANSMITTANCE,
     MATERIAL_SPECULAR = MATERIAL_ETA,
-    MATERIAL_IMAGE = MATERIAL_K /* colour of the mirror's */
+    MATERIAL_IMAGE = MATERIAL_K /* factor of the mirror ray */
 };
 enum {
     MATERIAL_IS_BLACK = 1 << 8,
@@ -54,7 +54,7 @@ struct scene_simd {
 
 /* Fills the record of a material. */
 void scene_simd_material(const struct material *m, float record[MATERIAL_WORDS]);
-/* NULL if out of memory. Does not refer to the scene. */
+/* NULL if out of memory. Keeps no reference to the scene. */
 NODISCARD struct scene_simd *scene_simd_build(const struct scene *s, struct err *e);
 void scene_simd_free(struct scene_simd *l);
 

@@ -5,9 +5,9 @@
 #include "integrator.h"
 
 /* Fills b->first of the active lanes from b->ray and b->hit. Albedo is the share of light that the
- * surface sends back at normal incidence: diffuse reflectance, a mirror's reflectance, a refracting
- * surface's transmittance, a conductor's Fresnel reflectance, and for glass both of its ways
- * together. */
+ * surface reflects or transmits at normal incidence: diffuse or mirror reflectance, transmittance of a
+ * refracting surface, Fresnel reflectance of a conductor, both together for glass, the sum of its
+ * lobes for plastic. */
 void first_hits_record(const struct integrator *it, struct batch *b, int num_active);
 
 #endif

@@ -6,7 +6,7 @@
 #include "paths_simd.h"
 #include "shade_simd.h"
 
-/* Samples of a light at a vertex whose rays go to the kernel together. */
+/* Samples of a light, at each vertex, whose shadow rays are traced in one call. */
 enum { TOGETHER = 4 };
 
 /* Vertices, as light sampling needs them. */
@@ -30,14 +30,14 @@ INLINE void load_vertex(const struct batch *b, int k, struct vertexv *v)
     v->bits = vi_load_any(b->bits + k);
 }
 
-/* Paths from k on whose surface scatters into more than single directions. */
+/* Mask of the paths k .. that go on and whose surface has a lobe that is not a delta. */
 INLINE unsigned scattering(const struct batch *b, int k)
 {
     return b->goes_on[k / LANES] & bits(has_bits(vi_load_any(b->bits + k), MATERIAL_SCATTERS));
 }
 
-/* f(wo, wi) cos(theta_i) and the BSDF's own density of wi for the lanes of the mask; which of them scatter some. None
- * does unless wi leaves on wo's side of the true surface. */
+/* f(wo, wi) cos(theta_i) and the BSDF's own density of wi, for the lanes of the mask. Returns the lanes that scatter at
+ * all: only such whose wi leaves on wo's side of the geometric surface. */
 INLINE unsigned scatter_towards(const struct integrator *it, const struct batch *b, int k,
                                 const struct vertexv *v, unsigned mask, vec3v wi, bool only_diffuse,
                                 rgbv *f, vf *pdf_w)
@@ -67,17 +67,17 @@ INLINE unsigned scatter_towards(const struct integrator *it, const struct batch 
     return mask & ~black & ~bits(rgb_is_zerov(*f));
 }
 
-/* Samples of a light that one call for each vertex takes. */
+/* The samples that one call of connect_light() takes at each vertex. */
 struct light_samples {
-    uint32_t purpose; /* of the first; the next has the next */
-    int num, count;   /* this call's, and what a vertex takes in all */
+    uint32_t purpose; /* of the first sample; each further one adds 1 */
+    int num, count;   /* samples of this call, and of a vertex in all */
     bool chosen;      /* of the light in b->choice, else of `light` */
     uint32_t light;
-    struct lamp lamp; /* the light, if it is one, where only diffuse things scatter */
+    struct lamp lamp; /* `light`, in the simple case of connect_light() */
 };
 
-/* Samples of the lamp for the vertices first .. end, a row of each, where their shadow rays will be: directions,
- * distances and, for tmin, pdf_w. A loop of its own, as draw_numbers(). */
+/* Samples the lamp for the vertices first .. end-1 and stores the samples, in rows of LANES, where their shadow rays
+ * will be: direction in d, distance in tmax, pdf_w in tmin. A separate loop, like draw_numbers(). */
 static __attribute__((noinline)) void sample_lamp_rows(struct batch *b, int first, int end,
                                                        const struct light_samples *what)
 {
@@ -95,7 +95,7 @@ static __attribute__((noinline)) void sample_lamp_rows(struct batch *b, int firs
     }
 }
 
-/* Not yet overwritten: rays are packed into rows up to this sample's. */
+/* Loads row j of sample_lamp_rows(). It is not overwritten yet: shadow rays are packed no further than this row. */
 INLINE void load_lamp_sample(const struct batch *b, int j, const struct lamp *lamp,
                              struct light_samplev *ls)
 {
@@ -128,7 +128,7 @@ static __attribute__((noinline)) void sample_chosen(const struct integrator *it,
     }
 }
 
-/* The same for other lights, one row; returns the lanes of the mask that have a sample. */
+/* Takes row j of samples of any lights; returns the lanes of the mask that have a sample. */
 INLINE unsigned sample_light(const struct integrator *it, const struct batch *b, int k,
                              const struct vertexv *v, unsigned mask,
                              const struct light_samples *what, int j, struct light_samplev *ls)
@@ -148,17 +148,17 @@ INLINE unsigned sample_light(const struct integrator *it, const struct batch *b,
     return mask;
 }
 
-/* Where a shadow ray ends: before the light, so that it does not meet it. Off by this part of the
- * distance, and by the rounding of the surface's coordinates twice: once because the ray starts that
- * far off the surface, once because the light lies about as far from the origin. Far from the
- * origin, or in a small scene, the second is more. */
+/* Where a shadow ray ends: short of the light, so that it does not hit it, by 1e-4 of the distance
+ * and by twice the rounding error of the surface's coordinates: once because the ray starts that far
+ * off the surface, once because the light is about as far from the scene's origin. Far from the
+ * origin, or in a small scene, the second term is the larger. */
 INLINE vf shadow_end(vf distance, vf eps)
 {
     return distance * (1 - 1e-4f) - 2 * eps;
 }
 
-/* A sample, by the numbers of row j, for the lanes of the mask of vertices k ..: shadow rays behind the
- * `rays` that there are, and what they bring into row j; the lanes that cast one. */
+/* Takes one sample, by the numbers of row j, for the lanes of the mask of vertices k ..: appends shadow rays
+ * to the `rays` that there are, and stores what they bring in row j. Returns the lanes that cast one. */
 INLINE unsigned connect_once(const struct integrator *it, struct batch *b, int k,
                              const struct vertexv *v, unsigned mask,
                              const struct light_samples *what, bool simple, int j, int rays)
@@ -201,7 +201,7 @@ INLINE void add_visible(struct batch *b, int k, int j, int num)
     rgb_store(&b->gathered, k, g);
 }
 
-/* Shadow rays from lanes first .. end; how many. */
+/* Casts the shadow rays of lanes first .. end-1; returns how many. */
 INLINE int connect_rows(const struct integrator *it, struct batch *b, int first, int end,
                         const struct light_samples *what, bool simple)
 {
@@ -220,13 +220,13 @@ INLINE int connect_rows(const struct integrator *it, struct batch *b, int first,
     return rays;
 }
 
-/* Other emitters are found by other means. */
+/* True if only delta lights are sampled; other emitters are then found by directions. */
 INLINE bool samples_only_delta(const struct integrator *it)
 {
     return it->opt.direct != DIRECT_LIGHT && it->opt.direct != DIRECT_MIS;
 }
 
-/* Each lane that samples a light chooses it by its u[3], and stores the remainder of u[3] there. */
+/* Chooses a light for each lane by its u[3], which becomes its position within the choice. */
 static __attribute__((noinline)) void choose(const struct integrator *it, struct batch *b, int n)
 {
     const struct light_clusters *t = samples_only_delta(it) ? it->lights->delta : it->lights->all;
@@ -250,8 +250,8 @@ static __attribute__((noinline)) void choose(const struct integrator *it, struct
     }
 }
 
-/* Samples a light from every lane that is not mirror-like, for as many lanes at a time as all these shadow
- * rays have room for. */
+/* Samples a light from every lane of scattering(), for as many lanes at a time as there is room for all their
+ * shadow rays. */
 static void connect_light(const struct integrator *it, struct batch *b, int n, int vertex,
                           struct light_samples what)
 {
@@ -278,8 +278,8 @@ static void connect_light(const struct integrator *it, struct batch *b, int n, i
     }
 }
 
-/* One uniform direction of the hemisphere from every lane that is not mirror-like, as one of `count` each; counts if it
- * meets an emitter. Rays and what they bring stand in the lanes of their vertices. */
+/* Samples one uniform direction of the hemisphere, one of `count`, from every lane of scattering(); adds what emitters
+ * send along it. Rays and what they bring stay in the lanes of their vertices. */
 static __attribute__((noinline)) void connect_hemisphere(const struct integrator *it,
                                                          struct batch *b, int n, int vertex,
                                                          uint32_t purpose, int count)

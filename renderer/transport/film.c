@@ -12,7 +12,7 @@ const char *const layer_names[NUM_LAYERS] = {"variance.R", "variance.G", "varian
                                              "normal.X",   "normal.Y",   "normal.Z",   "albedo.R",
                                              "albedo.G",   "albedo.B",   "id.object"};
 
-/* Blender's value of "nothing there". */
+/* Depth where nothing is hit, as Blender writes it. */
 #define DEPTH_OF_NOTHING 1e10f
 
 bool film_alloc(struct film *f, int width, int height, bool first_hits, struct err *e)

@@ -28,18 +28,18 @@ struct film {
     uint32_t num_samples;
 };
 
-/* All zero, without target. */
+/* Allocates a film, all zero and without target. False if out of memory. film_free() it. */
 NODISCARD bool film_alloc(struct film *f, int width, int height, bool first_hits, struct err *e);
 void film_free(struct film *f);
 
-/* The unit of its moments: samples of any but the independent sampler are stratified. */
+/* Sets the unit of the moments: "sample" for the independent sampler, else "stratified". */
 void film_set_sampler(struct film *f, enum sampler_kind kind);
-/* What the camera ray of lane i met, to a pixel of a film with first hits; after its radiance (film_simd.h). */
+/* Adds the first hit of lane i to a pixel of a film with first hits, after its radiance was added (film_simd.h). */
 void film_add_first_hit(struct film *f, size_t pixel, const struct first_hits *h, int i);
 
-/* Adds the samples of pixels first .. first+num-1 of src, which come after those that dst has of
- * these pixels, by moments_merge(). Both are films of the same size, with the same layers; targets
- * and film.num_samples are not looked at. */
+/* Adds the samples of pixels first .. first+num-1 of src after those that dst has, by
+ * moments_merge(). Both films must have the same size and the same layers; targets and num_samples
+ * are ignored. */
 NODISCARD bool film_merge(struct film *dst, const struct film *src, size_t first, int num,
                           struct err *e);
 
@@ -49,9 +49,9 @@ double film_relative_error(const struct film *f);
 
 /* The layers beside the moments, as an image to write with them: variance.R G B (of one sample),
  * stderr.R G B (of the pixel), depth.Z, depth.hits, normal.X Y Z, albedo.R G B, id.object.
- * A variance that one sample cannot tell is INFINITY; depth.Z is the distance from the plane through
+ * Variance and stderr are INFINITY below two samples. depth.Z is the distance from the plane through
  * the eye, along the viewing axis, in scene units, averaged over depth.hits samples, and 1e10 where
- * there are none, as Blender has it; normals are in world space, their means not of unit length. */
+ * there are none, as in Blender. Normals are in world space; their means are not of unit length. */
 NODISCARD bool film_layers(const struct film *f, struct image *out, struct err *e);
 
 enum { NUM_LAYERS = 15 };

@@ -5,10 +5,10 @@
 
 #include "film.h"
 
-/* Pixels of the film that follow each other, from the first one of the pointers on. */
+/* Most consecutive pixels that add_run() takes at once. */
 enum { FILM_RUN = 16 };
 
-/* The radiance of a lane; its luminance. */
+/* Loads the radiance of a lane into x; returns its luminance. */
 INLINE double load_sample(const struct rgbs *radiance, int lane, double x[3])
 {
     x[0] = radiance->r[lane];
@@ -17,8 +17,8 @@ INLINE double load_sample(const struct rgbs *radiance, int lane, double x[3])
     return 0.2126 * x[0] + 0.7152 * x[1] + 0.0722 * x[2];
 }
 
-/* moments_add() and the sums of luminance for `count` pixels, all of which have had the same number of
- * samples. */
+/* moments_add() and the sums of luminance for `count` consecutive pixels, all of which have the same number
+ * of samples. */
 static void add_run(double *restrict n, double *restrict mean, double *restrict m2,
                     double *restrict m3, double *restrict s1, double *restrict s2,
                     const struct rgbs *radiance, int lane, int count)
@@ -39,8 +39,8 @@ static void add_run(double *restrict n, double *restrict mean, double *restrict 
     }
 }
 
-/* The same for the first sample of a pixel. It reads no sum, and leaves M2 and M3 alone: memory that has not been
- * written yet would be mapped twice, the second time with a call to all processors. */
+/* The same for the first sample of a pixel. Reads no sum, and leaves M2 and M3 alone: pages that are read before they
+ * are written would be mapped twice, the second time with a TLB shootdown on all processors. */
 INLINE void first_of(struct film *f, size_t pixel, const struct rgbs *radiance, int lane)
 {
     double x[3], illuminance = load_sample(radiance, lane, x);

@@ -42,7 +42,7 @@ static void generate(const struct integrator *it, struct batch *b, int n)
     }
 }
 
-/* Shading normals of hits on triangles, from the scene itself: for one ray a pixel records do not pay. */
+/* Shading normals of hits on triangles, read from the scene: building records does not pay for one ray per pixel. */
 INLINE vec3v triangle_normals(const struct scene *s, const struct batch *b, int k, vi prim)
 {
     enum { WORDS = 9 };
@@ -62,7 +62,7 @@ INLINE vec3v triangle_normals(const struct scene *s, const struct batch *b, int 
                                vf_load_any(b->hit.u + k), vf_load_any(b->hit.v + k));
 }
 
-/* (n + 1)/2 of what the rays have met. */
+/* Stores (n + 1)/2 as radiance, n being the shading normal at the hit; black where there is none. */
 static __attribute__((noinline)) void show_normals(const struct integrator *it, struct batch *b,
                                                    int n)
 {

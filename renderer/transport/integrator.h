@@ -1,6 +1,5 @@
-/* Path tracing: the estimators of light transport, over batches of paths in stages: generate, intersect, shade,
- * connect, scatter. One path is one sample of its pixel's radiance,
- * independent of the others if the sampler is. */
+/* Path tracing: estimators of light transport over batches of paths, in stages: generate, intersect, shade, connect,
+ * scatter. One path is one sample of its pixel's radiance, independent of the others if the sampler is. */
 #ifndef ASSAY_INTEGRATOR_H
 #define ASSAY_INTEGRATOR_H
 
@@ -29,7 +28,7 @@ enum direct_kind {
 enum many_lights {
     LIGHTS_AUTO, /* all up to MANY_LIGHTS of them, else one */
     LIGHTS_ALL,  /* light_samples of each; one of each delta light */
-    LIGHTS_ONE   /* light_samples times one light, chosen by place */
+    LIGHTS_ONE   /* light_samples samples, each of a light chosen for the vertex */
 };
 
 /* How paths end before max_bounces, without changing a mean [Arvo90]. */
@@ -46,8 +45,8 @@ struct integrator_options {
     enum direct_kind direct;
     int max_bounces;   /* 0: emission seen directly, 1: + direct light, ... */
     int first_bounce;  /* light with fewer bounces is left out */
-    int light_samples; /* per area light and vertex; hemisphere: directions per area light, of which
-                          no more than MANY_LIGHTS count */
+    int light_samples; /* per area light and vertex; hemisphere: directions per area light, for at
+                          most MANY_LIGHTS of these */
     enum many_lights many_lights;
     enum roulette_kind roulette;
     float survival; /* ROULETTE_FIXED: 0 < survival <= 1 */
@@ -57,8 +56,8 @@ struct integrator_options {
         isa; /* of the stages; ISA_SCALAR: one path at a time. Every choice gives the same bits */
 };
 
-/* ROULETTE_THROUGHPUT: survival probability over the largest component of the throughput. With Sobol points, roulette at
- * every vertex undoes their gain: less is worth longer paths. */
+/* ROULETTE_THROUGHPUT: survival probability divided by the largest component of the throughput. Much roulette would
+ * undo the gain of Sobol points, so with them the longer paths of a higher probability pay. */
 static inline float roulette_factor(const struct integrator_options *o)
 {
     return o->sampler.kind == SAMPLER_INDEPENDENT ? 1 : 4;
@@ -82,27 +81,27 @@ struct batch {
     struct rgbs radiance;
     struct first_hits first;
     struct rgbs throughput;
-    float pdf_w[BATCH_ROOM]; /* of the ray's direction; 0 for camera rays and after a delta lobe,
-                                 whose emitters nothing else finds */
-    float eta2[BATCH_ROOM];  /* what the throughput is divided by for being inside glass */
+    float pdf_w[BATCH_ROOM]; /* of the ray's direction; 0 for camera rays and after a delta lobe:
+                                 no other technique finds the emitters that these hit */
+    float eta2[BATCH_ROOM];  /* product of the refractions' eta^2, by which throughput is divided */
     struct rays ray, shadow;
     struct hits hit, shadow_hit;
     struct rgbs shadow_light; /* what the shadow ray brings if nothing is in between */
     bool occluded[BATCH_ROOM];
     struct vec3s p, ng, ns, wo; /* of the hit; normals turned to the side of wo */
-    /* Where the ray starts: ns, if lights are chosen by it, and the total weight of the light clusters. */
+    /* At the start of the ray: ns, if lights or sky are sampled by it, and the total weight of the light clusters. */
     struct vec3s from_n;
     float from_weight[BATCH_ROOM];
     float eps[BATCH_ROOM];
     bool front[BATCH_ROOM];
     uint32_t material[BATCH_ROOM];
     uint16_t active[BATCH_ROOM], shadow_lane[BATCH_ROOM];
-    uint32_t choice[BATCH_ROOM]; /* of a light */
+    uint32_t choice[BATCH_ROOM]; /* the light */
     float choice_probability[BATCH_ROOM], choice_weight[BATCH_ROOM];
-    /* Paths that go on are kept side by side: whose path a lane is, and what it has gathered. */
+    /* Paths that go on are kept side by side. slot: the lane of `pixel` and `radiance` to which a path belongs. */
     uint32_t slot[BATCH_ROOM], slot_pixel[BATCH_ROOM], slot_sample[BATCH_ROOM];
     float numbers
-        [4][BATCH_ROOM]; /* random numbers; a row of LANES: these paths, one purpose */
+        [4][BATCH_ROOM]; /* random numbers, in rows of LANES paths for one purpose */
     struct rgbs gathered, reflectance;
     int32_t bits[BATCH_ROOM]; /* of the material's record */
     /* One element per LANES paths, a bit for each. */
@@ -112,7 +111,7 @@ struct batch {
 
 void integrator_run(const struct integrator *it, struct batch *b, int num_lanes);
 
-/* One light, chosen by place, is sampled at a vertex and not each of them. */
+/* True if a vertex samples lights chosen for its place instead of every light. */
 static inline bool chooses_light(const struct integrator *it)
 {
     switch (it->opt.many_lights) {

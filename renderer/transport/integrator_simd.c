@@ -14,7 +14,7 @@ static void integrate_lanes(const struct integrator *it, struct batch *b, int n)
 {
     const bool last_ray = it->opt.direct == DIRECT_BSDF || it->opt.direct == DIRECT_MIS;
     generate(it, b, n);
-    for (int i = 0; i < BATCH_LANES; i++) /* n of paths, but of shadow rays there may be more */
+    for (int i = 0; i < BATCH_LANES; i++) /* there are n paths, but there may be more shadow rays */
         b->active[i] = (uint16_t)i;
     if (it->opt.kind == INTEGRATE_NORMALS) {
         bvh_closest(it->bvh, &b->ray, b->active, n, &b->hit, &b->stats);

@@ -7,6 +7,7 @@
 #include "renderer/shading/bsdf_simd.h"
 #include "renderer/shading/light_simd.h"
 
+/* True if light after that many bounces is part of the image. */
 static inline bool counts(const struct integrator *it, int bounces)
 {
     return bounces >= it->opt.first_bounce && bounces <= it->opt.max_bounces;
@@ -22,7 +23,7 @@ INLINE void pick_rgb(struct rgbs *a, int i, rgbv c, vi order)
     rgb_store(a, i, (rgbv){pick(c.r, order), pick(c.g, order), pick(c.b, order)});
 }
 
-/* To draw: the first `used` numbers of `num` purposes of a vertex. */
+/* Which numbers to draw: the first `used` ones of `num` consecutive purposes of a vertex. */
 struct draws {
     int vertex;
     uint32_t purpose;
@@ -50,8 +51,8 @@ INLINE void draw_rows(struct batch *b, enum sampler_kind kind, uint64_t seed, in
     }
 }
 
-/* Draws numbers for the lanes first .. end, LANES at a time, into rows of b->numbers. A loop of its own, so short that
- * the CPU overlaps several iterations. Every unused number of a Sobol point would cost time. */
+/* Draws numbers for the lanes first .. end-1, LANES at a time, into rows of b->numbers. A separate loop, short enough
+ * for the processor to overlap iterations. Every unused number of a Sobol point would cost time. */
 static __attribute__((noinline)) void draw_numbers(const struct integrator *it, struct batch *b,
                                                    int first, int end, struct draws what)
 {
@@ -72,7 +73,7 @@ INLINE void load_numbers(const struct batch *b, int row, vf u[4])
         u[d] = vf_load_any(b->numbers[d] + LANES * row);
 }
 
-/* Light comes to lanes k .. of the mask. */
+/* Adds light to what the paths k .. of the mask have gathered. */
 INLINE void gather_light(struct batch *b, int k, vi mask, rgbv light)
 {
     rgb_store(&b->gathered, k, rgb_addv(rgb_load(&b->gathered, k), rgb_where(mask, light)));

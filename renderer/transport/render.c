@@ -11,7 +11,7 @@
 enum { TILE = 16, ERROR_CHECK_EVERY = 16 };
 _Static_assert(TILE *TILE <= BATCH_LANES, "one lane for every pixel of a tile");
 
-/* A pass should last about this long: short for an answer to Ctrl-C, long against starting threads. */
+/* A pass should last about this long: short enough to answer Ctrl-C, long compared with starting threads. */
 static const double pass_seconds = 0.5;
 
 /* The pilot's random numbers come from a seed of their own: other sample numbers of the same seed would
@@ -22,13 +22,13 @@ struct job {
     const struct integrator *it;
     const struct render_options *opt;
     struct film *film;
-    uint32_t last; /* the pass ends before this many samples per pixel */
+    uint32_t last; /* the pass renders sample numbers below this */
     int tiles_x, num_tiles;
-    int stretch; /* tiles of one of as many stretches of the image as there are threads */
+    int stretch; /* tiles in a stretch; there are as many stretches as threads */
     atomic_int next_ticket;
     atomic_bool out_of_memory;
     atomic_ullong samples_done;
-    pthread_mutex_t lock; /* of running and stats */
+    pthread_mutex_t lock; /* guards running, stats */
     pthread_cond_t ended; /* running has become 0 */
     int running;
     struct bvh_stats stats;
@@ -40,8 +40,8 @@ static bool has_converged(const struct render_options *o, double s1, double s2, 
     return 1.96 * sqrt(variance > 0 ? variance / n : 0) <= o->adaptive_tolerance * mean;
 }
 
-/* Has a pixel with n samples, the film's number, all that it is to get? It then keeps that answer,
- * so that nothing but the film need be remembered between passes. */
+/* True if a pixel with n samples has all that it is to get. That does not change later, so nothing but
+ * the film has to be remembered between passes. */
 static bool has_stopped(const struct render_options *o, const struct film *f, size_t pixel,
                         uint32_t n)
 {
@@ -91,8 +91,8 @@ static void render_tile(struct job *j, struct batch *b, int tile)
     }
 }
 
-/* The tile of a ticket, which may lie behind the last. Tickets go round the stretches: at neighbouring tiles two
- * threads would take cache lines and pages from each other. */
+/* The tile of a ticket; it may be past the last. Tickets go round the stretches, since two threads on neighbouring
+ * tiles would take cache lines and pages from each other. */
 static int tile_of(const struct job *j, int ticket)
 {
     return ticket % j->opt->threads * j->stretch + ticket / j->opt->threads;
@@ -144,7 +144,7 @@ static void look(struct job *j, struct watch *w)
         w->asked = c->asked_to_stop(c->arg);
 }
 
-/* Samples film->num_samples .. last-1 of every pixel that wants them. */
+/* Renders samples film->num_samples .. last-1 of every pixel that has not stopped. */
 static bool render_pass(struct job *j, struct watch *w, uint32_t last, struct err *e)
 {
     pthread_t *threads = calloc((size_t)j->opt->threads, sizeof *threads);
@@ -250,7 +250,7 @@ static bool run_job(struct job *j, struct watch *w, enum render_end *end, struct
     j->num_tiles = j->tiles_x * ((j->opt->height + TILE - 1) / TILE);
     j->stretch = (j->num_tiles + j->opt->threads - 1) / j->opt->threads;
     pthread_mutex_init(&j->lock, NULL);
-    pthread_condattr_t monotonic; /* a wall clock that is set must not make it wait */
+    pthread_condattr_t monotonic; /* setting the wall clock must not prolong a wait */
     pthread_condattr_init(&monotonic);
     pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);
     pthread_cond_init(&j->ended, &monotonic);
@@ -261,7 +261,7 @@ static bool run_job(struct job *j, struct watch *w, enum render_end *end, struct
     return ok;
 }
 
-/* Fills film->target. Stopped early, it leaves none. */
+/* Renders the pilot and fills film->target; if it is stopped early, film->target stays NULL. */
 static bool run_pilot(const struct integrator *it, const struct render_options *opt,
                       struct watch *w, struct film *film, struct render_stats *stats,
                       enum render_end *end, struct err *e)

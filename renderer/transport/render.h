@@ -14,9 +14,9 @@ struct render_options {
     uint32_t first_sample;   /* sample numbers first_sample .. first_sample + num_samples - 1 */
     uint32_t num_samples;    /* per pixel (the most, if adaptive) */
     int threads;
-    /* The assignment's adaptive rule: after every `batch` samples a pixel stops if 1.96 s/sqrt(n)
-     * <= tolerance * mean of its illuminance. 0: off. Biased by design: it averages the samples
-     * that it stopped on. */
+    /* The assignment's adaptive rule: after every adaptive_batch samples a pixel stops if 1.96
+     * s/sqrt(n) <= adaptive_tolerance * mean of its luminance. 0: off. Biased by design: it averages
+     * the samples that it stopped on. */
     int adaptive_batch;
     double adaptive_tolerance;
     /* The unbiased mode: `pilot_samples` samples of a pixel, from random numbers of their own, decide how
@@ -64,7 +64,7 @@ NODISCARD bool render_film(const struct scene *s, const struct camera *c, const 
                            struct progress *progress, struct film *film, struct render_stats *stats,
                            struct err *e);
 
-/* The same from the start to the end into *out (one path each; the caller frees). */
+/* The same from the start, without control. *out: moments over single paths; the caller frees them. */
 NODISCARD bool render(const struct scene *s, const struct camera *c, const struct bvh *bvh,
                       const struct render_options *opt, struct progress *progress,
                       struct moments *out, struct render_stats *stats, struct err *e);

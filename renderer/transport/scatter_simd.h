@@ -24,7 +24,7 @@ INLINE vf survival(const struct integrator_options *o, int vertex, rgbv throughp
     return vf_min(vf_set(1), roulette_factor(o) * (rgb_maxv(throughput) * eta2));
 }
 
-/* The paths of the mask are over. */
+/* Stores the radiance of the paths of the mask, which are finished. */
 INLINE void finish(struct batch *b, int k, unsigned over)
 {
     for (; over; over &= over - 1) {
@@ -33,8 +33,8 @@ INLINE void finish(struct batch *b, int k, unsigned over)
     }
 }
 
-/* Sets up the next ray of every path that goes on, and moves these to the front; how many. only_delta: the last ray of
- * a path, where light sampling has already dealt with all emitters but those behind a delta lobe. */
+/* Sets up the next ray of every path that goes on and moves these paths to the front; returns how many. only_delta: the
+ * next ray is a path's last, and light sampling has already counted all emitters but those that a delta lobe finds. */
 static int scatter(const struct integrator *it, struct batch *b, int n, int vertex, bool only_delta)
 {
     const vf zero = vf_set(0);

@@ -6,7 +6,7 @@
 #include "paths_simd.h"
 #include "renderer/scene/shape_simd.h"
 
-/* struct surface, and what it is of. */
+/* struct surface, with the numbers of its material and light. */
 struct surfacev {
     vec3v p, ng, ns;
     vf eps;
@@ -48,7 +48,7 @@ INLINE void surfaces(const struct integrator *it, const struct rays *r, const st
     s->ns = v3_select(sphere, n, s->ns);
 }
 
-/* Radiance that the lanes of the mask see, along d, of emitters' surfaces: of hits from k. */
+/* Radiance that the surfaces s (hits k ..) emit against the ray directions d, for the lanes of the mask. */
 INLINE rgbv emitted(const struct scene *scene, const struct surfacev *s, const struct hits *h,
                     int k, vec3v d, unsigned mask)
 {
@@ -75,8 +75,8 @@ INLINE vf power_heuristic(vf a, vf b)
     return vf_select(vf_lt(vf_set(0), a), 1 / (1 + r * r), vf_set(0));
 }
 
-/* Weight of emission that the lanes of the mask ran into: of lights of these numbers on surface s, or of the
- * environment (s is NULL), whose density is pdf_light. */
+/* Weight of the emission that the paths of the mask have hit: of these lights on surface s, or, with s NULL, of the
+ * environment, whose density is pdf_light. */
 INLINE vf emission_weight(const struct integrator *it, const struct batch *b, int k, unsigned mask,
                           const int32_t light[LANES], const struct surfacev *s, vf pdf_light)
 {
@@ -102,8 +102,8 @@ INLINE vf emission_weight(const struct integrator *it, const struct batch *b, in
                      power_heuristic(pdf_w, (float)it->opt.light_samples * pdf_light));
 }
 
-/* Adds what the environment (s is NULL) or the lights whose surfaces the paths of the mask have met send along
- * their rays. */
+/* Adds the weighted emission that the paths of the mask have hit: of the surfaces s, or, with s NULL, of the
+ * environment. */
 static __attribute__((noinline)) void add_emission(const struct integrator *it, struct batch *b,
                                                    int k, unsigned mask, const struct surfacev *s,
                                                    int vertex)
@@ -128,8 +128,8 @@ static __attribute__((noinline)) void add_emission(const struct integrator *it, 
     gather_light(b, k, lanes_of(mask), rgb_scalev(rgb_mulv(rgb_load(&b->throughput, k), le), w));
 }
 
-/* Multiplies the reflectance of the lanes of the mask by what their surfaces' textures have there;
- * a path on black is over. */
+/* Multiplies the reflectance in the lanes of the mask by their textures; ends paths on a diffuse
+ * surface that is black there. */
 static __attribute__((noinline)) void apply_textures(const struct integrator *it, struct batch *b,
                                                      int k, unsigned mask)
 {
@@ -180,7 +180,7 @@ static void shade(const struct integrator *it, struct batch *b, int n, int verte
         vi front = vf_lt(vf_set(0), dotv(s.ng, wo));
         s.ng = v3_negate_if(~front, s.ng);
         s.ns = v3_negate_if(~front, s.ns);
-        /* An interpolated normal that looks away from the viewer has no hemisphere to share. */
+        /* A shading normal that faces away from the viewer is replaced by the geometric one. */
         s.ns = v3_select(vf_le(dotv(s.ns, wo), vf_set(0)), s.ng, s.ns);
         v3_store(&b->p, k, s.p);
         v3_store(&b->ng, k, s.ng);

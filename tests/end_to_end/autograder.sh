@@ -76,7 +76,7 @@ if [ "$(id -u)" = 0 ]; then
 else
     echo "skip autograder: without a sandbox: only root can run programs as somebody else"
 fi
-# Our own trouble is nobody's fault: no results, and an exit status.
+# If we fail, there are no results, and the exit status says so.
 rm -rf results source/rubric/quick.rubric
 if source/run_autograder >"$tmp/out" 2>&1 || [ -e results/results.json ]; then
     echo "not ok autograder: without a rubric there are no results: there are"

@@ -1,4 +1,5 @@
-/* LD_PRELOAD: the wall clock jumps by an hour, back and forth, at every look; CLOCK_MONOTONIC and CPU clocks do not, as in Linux. */
+/* For LD_PRELOAD: the wall clock jumps by an hour, back and forth, at every call; CLOCK_MONOTONIC
+ * and CPU clocks do not. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <stdatomic.h>

@@ -1,8 +1,9 @@
 #!/bin/bash
-# tests/end_to_end/coverage.sh BUILD PROGRAM...: runs the test programs, built with clang's counters into BUILD/cov, the end-to-end runs with the
-# programs built so, and one validation with live engines, and prints which share of the lines of each file of renderer/, reference/ and tools/ they reach, and
-# then of the three. Fails below 90 % of one of them. BUILD/cov/missed says which lines they do not. What a test program says goes to
-# BUILD/cov/log: whether they pass is `make check`'s business.
+# tests/end_to_end/coverage.sh BUILD PROGRAM...: runs the test programs, built with clang's counters into BUILD/cov, the
+# end-to-end runs with programs built so, and one validation with live engines. Prints the share of lines that they
+# reach, for each file of renderer/, reference/ and tools/, then for these three; fails if it is below 90 % for one of
+# the three. BUILD/cov/missed lists the lines not reached. Outputs of the tests go to BUILD/cov/log; whether they pass
+# is left to `make check`.
 # SKIP_END_TO_END=1: the test programs alone.
 set -u
 build=$(realpath "${1:?usage: tests/end_to_end/coverage.sh BUILD PROGRAM...}")
@@ -18,7 +19,7 @@ mkdir -p "$cov/profile" "$cov/log"
     printf '%s\n' "$@" | grep -E "$long"
     printf '%s\n' "$@" | grep -vE "$long"
 } | sed 's#^/.*/\(.*\)#\1 &#' >"$cov/jobs"
-# The end-to-end runs want two builds, what the benchmark and the browser need, and the version.
+# The end-to-end runs expect two builds, the benchmark, what the browser needs, and the version.
 ln -sfn . "$cov/san"
 ln -sfn "$build/browser" "$cov/browser"
 ln -sf "$build/tests/bench" "$cov/tests/bench"
@@ -38,7 +39,7 @@ for program in "$cov/assay" "$cov/oiio.so" "$@"; do
 done
 llvm-cov export -format=lcov "$cov/pathtracer" "${objects[@]}" -instr-profile="$cov/profile/all" \
     -ignore-filename-regex='(^/usr|tests/)' 2>"$cov/log/llvm-cov" >"$cov/lcov"
-# SF:file, then DA:line,count of each of its lines.
+# lcov's format: SF:file, then DA:line,count for each of its lines.
 awk -F '[:,]' -v here="$PWD/" -v missed_lines="$cov/missed" '
     $1 == "SF" { file = substr($0, 4); sub(here, "", file); part = file; sub(/\/.*/, "", part); order[++files] = file }
     $1 == "DA" {

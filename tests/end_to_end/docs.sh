@@ -1,6 +1,7 @@
 #!/bin/bash
-# tests/end_to_end/docs.sh BUILD: every relative link of every Markdown file of the repository leads to a file that is there, and to a
-# heading that it has; sources that pages name are there, and pages that sources name; the commands of README and guides run in an empty folder; what programs write has the keys of its manual (tools/docs/formats; what
+# tests/end_to_end/docs.sh BUILD: every relative link of every Markdown file of the repository leads to a file that
+# exists, and to a heading that it has; sources that pages name exist, and pages that sources name; the commands of
+# README and guides run in an empty folder; what programs write has the keys of its manual (tools/docs/formats; what
 # they read: test_formats.c). Prints "ok NAME" or "not ok NAME: why".
 set -u
 build=$(realpath "${1:?usage: tests/end_to_end/docs.sh BUILD}")
@@ -14,7 +15,7 @@ failures=0 what=docs
 fragments() {
     sed -n 's/^##* //p' "$1" | tr '[:upper:]' '[:lower:]' | sed 's/[^[:alnum:] _-]//g; s/ /-/g'
 }
-# Of files given by name: a line for each link that leads nowhere. Links in code are not links.
+# Prints a line for each dead link of the files given. Links in code do not count.
 dead_links() {
     local page link file
     for page in "$@"; do
@@ -40,7 +41,7 @@ printf '## A heading, 2\n' >"$tmp/two.md"
 tell "control: two dead links are seen" "$(dead_links "$tmp/docs/one.md" | sed "s,^$tmp/,," |
     diff - <(printf 'docs/one.md: gone.md\ndocs/one.md: ../two.md#gone: no such heading\n'))"
 
-# Sources in code of pages, by name or from the top, and pages named in sources: those that are not there. NAME stands for any.
+# Prints sources named in code of pages, by name or by path, that do not exist. A name with NAME in it stands for any.
 git ls-files -co --exclude-standard | sed 's,.*/,,' | sort -u >"$tmp/names"
 missing_names() {
     grep -oE '`[A-Za-z0-9_/]+\.(c|h|cc|sh|mjs|js)`' "$@" /dev/null | tr -d '`' | grep -v NAME | while IFS=: read -r page name; do
@@ -62,7 +63,7 @@ cd "$tmp" || exit 1
 ln -s "$build" build
 ln -s "$top/tools" "$top/reference" "$top/tests" "$top/golden" .
 
-# Code in a page: indented lines below a heading; or lines that begin with "$ ".
+# Code in a page: the indented lines below a heading.
 code_below() { # PAGE HEADING
     awk -v head="$2" '/^#/ { on = $0 == head } on && sub(/^    /, "")' "$1"
 }
@@ -97,7 +98,7 @@ page_keys() { # PAGE
 json_keys() { # FILE...
     cat "$@" | grep -oE '"[a-z0-9_]+" *:' | grep -oE '[a-z0-9_]+' | sort -u
 }
-# A line for each key of the file's list ($1) that the page lacks, and for each of the page that nothing in the programs has.
+# Prints a line for each key in the list KEYS that the page lacks, and for each key of the page that no source has.
 differ() { # KEYS PAGE
     local key
     page_keys "$2" >keys.page
@@ -117,7 +118,7 @@ else
     tell "keys of grades" "$(differ keys $formats/grades.md)"
 fi
 
-# JSON Schemas: those of the pages, and valid is what programs write.
+# JSON Schemas: they are made from the pages, and what programs write is valid.
 for page in results grades suite; do
     tell "the schema of $page is its page's" "$(python3 "$top/tools/packaging/schemas.py" $formats/$page.md | diff - $formats/$page.schema.json | head -n 3)"
 done
@@ -137,7 +138,7 @@ valid() { # SCHEMA FILE...: what is wrong with them
 [ -n "$has_schemas" ] || echo "skip docs: schemas (no python3-jsonschema)"
 [ ! -d grades ] || tell "grades are valid by their schema" "$(valid grades grades/*/grade.json)"
 
-# The other guides and the doors of the README, each in a folder that is empty but for the checkout's names.
+# The other guides and the commands of the README, in the same folder of links to the checkout.
 cp reference/scenes/41_cornell.dae scene.dae
 cp "$top/README.md" .
 for page in tools/docs/guide-renderer.md tools/docs/guide-report.md README.md; do
@@ -153,8 +154,8 @@ done
 [ -s page.html ] || tell "the page of the guide" "is not there"
 printf '    false\n    bash -c "exit 3"\n    make no-such-target\n' >bad.md
 tell "control: a command that fails is seen" "$(run_page bad.md | diff - <(printf 'make no-such-target: no such target;\nbash -c "exit 3": 3;\n'))"
-# RESULTS.md is what the program prints: the differences of a scene, which no other scene moves. Its rows are scenes of the suite;
-# scenes that are new come with the next `make results`.
+# RESULTS.md is what the program prints: tested by the differences of two scenes, which do not depend on others. Its
+# rows have to be scenes of the suite; new scenes come with the next `make results`.
 tell "rows of RESULTS.md" "$(sed -n 's/^| \([0-9][0-9]_[a-z0-9_]*\) | .*/\1/p' tools/RESULTS.md | sort -u |
     comm -23 - <(cd reference/scenes && ls [0-9]*.json | sed 's/.json//' | sort))"
 build/assay validate -q --only 12_point_plane --only 31_spot_plane -o suite >out 2>&1
@@ -167,11 +168,14 @@ build/assay compare -q --tile 16 --margin 0.5 --json compare.json 1.exr 2.exr
 build/assay validate -q --only 12_point_plane -o validated >out 2>&1
 build/assay converge -q --shrink 4 -k 4 --ladder 1,4,16 --engine pathtracer --engine pathtracer-sobol -o converged 13_square_patch >out 2>&1
 build/assay compare -q --same-program --accept-mdb 0.5 --json same.json 1.exr 2.exr
-tell "results are valid by their schema" "$(valid results compare.json same.json validated/results.json converged/results.json)"
+mkdir a b
+for seed in a/1 a/2 a/3 b/4 b/5 b/6; do build/pathtracer -q -r 8 8 -s 4 --seed ${seed#*/} -f $seed.exr $scene >out 2>&1; done
+build/assay compare -q --exchangeable --alpha 0.2 --json exchanged.json a b >out 2>&1
+tell "results are valid by their schema" "$(valid results compare.json same.json exchanged.json validated/results.json converged/results.json)"
 sed 's/"tile": [0-9]*/"tile": "16"/; s/"reason"/"raeson"/' compare.json >wrong.json
 [ -z "$has_schemas" ] || tell "control: a number as text and a key that is not there are seen" "$(valid results wrong.json |
     grep -c "is not of type\|raeson\|required" | grep -vx 3)"
-json_keys compare.json validated/results.json converged/results.json >keys
+json_keys compare.json exchanged.json validated/results.json converged/results.json >keys
 tell "keys of results" "$(differ keys $formats/results.md)"
 
 build/assay plan --parts 2 pathtracer -s 4 -r 32 32 -f cells.exr $scene >out 2>&1

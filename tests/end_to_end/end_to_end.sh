@@ -6,7 +6,8 @@ build=$(realpath "${1:?usage: tests/end_to_end/end_to_end.sh BUILD}")
 pathtracer=$build/pathtracer assay=$build/assay
 # Where bad input is fed in, the sanitized builds run.
 san_pathtracer=$build/san/pathtracer san_assay=$build/san/assay
-# Whose objects mutants are made of, and what is installed: tests/end_to_end/coverage.sh counts lines in programs of another compiler.
+# The build whose objects mutants are linked with, and that is installed: not that of tests/end_to_end/coverage.sh, by
+# another compiler.
 plain=$(realpath "${PLAIN_BUILD:-$build}")
 tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT
@@ -129,7 +130,8 @@ expect "one seed twice" 3 "--seed: 7 is there twice" "$san_pathtracer" --seed 7,
 expect "two seeds, resumed" 3 "one alone with --resume" "$san_pathtracer" --seed 1,2 --resume "$tmp/of_1.exr" -f "$tmp/of.exr" $scene
 expect "two seeds in jobs" 3 "--seed: cannot be cut" "$assay" slurm pathtracer --seed 1,2 -f "$tmp/of.exr" $scene
 
-# What tests/support/asan_options.c turns off is on without it: else a search for leaks now and then dies of where a variable happens to lie.
+# Control of tests/support/asan_options.c: what it turns off is on by default, and would now and then make LeakSanitizer
+# die.
 sky=reference/scenes/46_sky.exr
 late_variables() { # ASAN_OPTIONS: those of libraries loaded late that the sanitizer took note of
     ASAN_OPTIONS=$1 "$san_assay" compare $sky $sky 2>&1 | grep -c '__tls_get_addr: 0x'
@@ -157,8 +159,8 @@ head -c 4000 "$tmp/whole.exr.state" >"$tmp/cut.exr.state"
 expect "resume: damaged state" 3 "damaged" \
     "$san_pathtracer" -q -r 48 32 --aov $scene -s 40 --resume "$tmp/cut.exr" -f "$tmp/part.exr"
 
-# interrupt SIGNAL STATUS: a render without end is interrupted, its moments are valid, and it can be gone
-# on with for two samples more than it has.
+# interrupt SIGNAL STATUS: interrupts an endless render; its moments are valid, and it can be resumed up to
+# two samples more than it has.
 interrupt() {
     rm -f "$tmp/long.exr" "$tmp/long.exr.state"
     expect "$1 ends with $2 and says how to resume" "$2" "pathtracer --resume $tmp/long.exr " \
@@ -401,8 +403,8 @@ expect "compare --report: no directory" 3 "one.exr: not a directory" "$san_assay
 expect "unknown verb" 3 "unknown verb" "$san_assay" assay
 expect "report: no file" 3 "none.json" "$san_assay" report none.json
 
-# Convergence. The controls are our own program with a fault: a slope that is not -1/2, a bias, a seed
-# without effect.
+# Convergence. Controls: our own program with a slope that is not -1/2, with a bias, with a seed without
+# effect.
 converge="$assay converge -q --engine pathtracer --shrink 8 -k 8 --ladder 1,4,16 --alpha 0.01 --slope-margin 0.25"
 expect "converge" 0 "slope of RMSE.*EQUIVALENT" \
     $converge --margin 0.2 -o "$tmp/conv" 41_cornell
@@ -548,7 +550,7 @@ verdict_of() { claims_of "$1" | awk -F '\t' -v a="$2" -v b="$3" '$1 == a && $2 =
 fake 'exec student_tracer "$@" 1.05'
 expect "a renderer that is 5 % too bright differs" 1 "fake *truth *+[45]\..*DIFFERENT *EQUIVALENT *WRONG" \
     env PATH="$engine_path" $fake "$tmp/fake.json"
-# One that makes spectra of colours, and mixes them by a tenth: right in grey, so with a run for each channel.
+# A spectral renderer, say, that mixes channels by a tenth: right for grey, and so with a run for each channel.
 fake 'awk -F "\"" -v OFS="\"" "/<rgb/ { split(\$4, v, \", *\"); m = (v[1] + v[2] + v[3]) / 3
     \$4 = sprintf(\"%.9g, %.9g, %.9g\", v[1] + (m - v[1]) / 10, v[2] + (m - v[2]) / 10, v[3] + (m - v[3]) / 10) } 1" "$1" >"$1.xml"
 scene=$1.xml
@@ -558,8 +560,8 @@ expect "a renderer that mixes colours differs" 1 "fake *truth .*DIFFERENT *EQUIV
 sed 's/"expresses"/"channels": "separate", "expresses"/' "$tmp/fake.json" >"$tmp/apart.json"
 expect "and does not with each channel by itself" 0 "fake *truth .*EQUIVALENT *EQUIVALENT *ok" env PATH="$engine_path" $fake "$tmp/apart.json"
 fake 'exec student_tracer "$@" 1.05'
-# The commands that the results print for each claim, of a suite and an engine whose names a shell has to be told: each judges that claim
-# again, with the verdict that it had.
+# The commands that results.json has for each claim, here with names of suite and engine that need quotes: each judges
+# its claim again, with the same verdict.
 mkdir "$tmp/my suite" "$tmp/my engine"
 cp reference/scenes/12_point_plane.* "$tmp/my suite"
 cp "$tmp/fake.json" "$tmp/fake.sh" "$tmp/my engine"
@@ -612,7 +614,7 @@ expect "what a renderer cannot express is listed" 0 "student cannot express 12_p
     env PATH="$engine_path" $validate --only 11_furnace/student:truth --only 12_point_plane \
     --engine "$tmp/no_points.json" --engine-spp 4 --engine-replicates 3
 
-# A pixel filter of its own: the references are made with it, and another than it says is found.
+# An engine's own pixel filter: references are made with it, and a filter other than the declared one is found.
 filtered() { # FILTER
     cat >"$tmp/filtered.json" <<END
 {"name": "filtered", "format": "dae", "expresses": ["diffuse", "environment"], "output": "mean", "spp": 256, "replicates": 16,
@@ -634,7 +636,7 @@ cp -R reference/scenes "$tmp/scenes"
 echo '<!-- changed -->' >>"$tmp/scenes/11_furnace.dae"
 expect "a stale golden is not judged" 3 "11_furnace" $validate --only 11_furnace/cycles --suite "$tmp/scenes"
 
-# golden: what may be stored. The stored goldens stand in for candidates.
+# golden: what may be stored. The stored goldens serve as candidates.
 golden="$san_assay golden"
 expect "golden status" 0 "current  41_cornell/cycles" $golden status
 expect "golden status of damaged goldens" 3 "damaged  11_furnace/cycles" \
@@ -677,13 +679,13 @@ expect "a validation of a wrong renderer" 1 "DIFFERENT" "$assay" validate --only
     --pathtracer "$plain/mutants/point_light_linear/pathtracer" --out "$tmp/wrong_suite"
 expect "diagnose: the images of a validation" 1 "tests/mutants/point_light_linear.patch" \
     "$assay" diagnose "$tmp/wrong_suite/results.json"
-# The renderer of --engine is the one that is looked at, not ours beside it, which is right.
+# The renderer of --engine is diagnosed, not ours beside it, which is right.
 sed "s|{here}/mine.sh|$tmp/wrong_engine.sh|; s|\"spp\": 32, \"replicates\": 64|\"spp\": 16, \"replicates\": 16|" reference/engines/mine.json >"$tmp/wrong_engine.json"
 sed "s|^exec pathtracer|exec '$plain/mutants/point_light_linear/pathtracer'|" reference/engines/mine.sh >"$tmp/wrong_engine.sh"
 chmod +x "$tmp/wrong_engine.sh"
 expect "a validation of a wrong engine" 1 "DIFFERENT" "$assay" validate --only 12_point_plane --engine "$tmp/wrong_engine.json" --out "$tmp/wrong_engine"
 expect "diagnose: the engine of a validation" 1 "tests/mutants/point_light_linear.patch" "$assay" diagnose "$tmp/wrong_engine/results.json"
-# Another program may lie off by less than the margin (0.3 % of Cycles), and is not accused of it; of 2 % it is.
+# Another program may differ by less than the margin (0.3 % for Cycles) and is not accused of it; for 2 % it is.
 cp reference/engines/mine.sh "$tmp/scaled.sh"
 sed -i "s|^exec pathtracer|exec $pathtracer|" "$tmp/scaled.sh"
 for case in "1.002 0 nothing wrong found" "1.02 1 none of the"; do
@@ -692,7 +694,7 @@ for case in "1.002 0 nothing wrong found" "1.02 1 none of the"; do
     "$assay" validate -q --only 12_point_plane --engine "$tmp/scaled.json" --out "$tmp/scaled" >"$tmp/out" 2>&1
     expect "diagnose: an engine whose images are $scale times ours" "$code" "$words" "$assay" diagnose "$tmp/scaled/results.json"
 done
-# Nor of a pixel filter that it declares, at the edge of a cone of light.
+# Nor is it accused of a pixel filter that it declares, which shows at the edge of a cone of light.
 sed "s|^exec pathtracer|exec $pathtracer --filter gauss:0.5:2|" reference/engines/mine.sh >"$tmp/scaled.sh"
 sed "s|{here}/mine.sh|$tmp/scaled.sh|; s|\"point\"|&, \"spot\", \"falloff\"|; s|\"spp\": 32, \"replicates\": 64|\"spp\": 64, \"replicates\": 16, \"filter\": \"gauss:0.5:2\", \"shared_samples\": false|" \
     reference/engines/mine.json >"$tmp/scaled.json"
@@ -712,13 +714,13 @@ expect "diagnose: unknown bug" 3 "has no bug 'x'" "$san_assay" diagnose --withou
 expect "diagnose: no catalogue" 3 "none/manifest.json" "$san_assay" diagnose --catalogue "$tmp/none"
 expect "diagnose: no program" 3 "no such program" "$san_assay" diagnose --pathtracer "$tmp/none"
 
-# Each part of `make bench` on its smallest case: that it runs, not what it finds.
+# Each part of `make bench` on its smallest case: tests that it runs, not its results.
 ASSAY_CS184=$tmp/none expect "bench, a tiny run that says what it skips" 0 "SKIPPED: no $tmp/none" \
     "$build/tests/bench" --smoke --build "$build" --out "$tmp/bench"
 expect "bench: its figures" 0 '"mrays_per_cpu_second"' cat "$tmp/bench/results.json"
 expect "bench: no such part" 3 "'nonsense' is none of: rays, paths, jobs, scaling" "$build/tests/bench" nonsense
 
-# Grading: one right program among hostile ones; each costs its author the check, none of them the run.
+# Grading: right programs among hostile ones; a hostile one costs its author the check, and never stops the run.
 expect "grade: help" 0 "unsafe-no-sandbox" "$san_assay" grade --help
 expect "grade: the rubric of the course" 0 "100 points" "$san_assay" grade --check-rubric tools/rubrics/cs184-3-1.rubric
 sed 's/^  spp 16/  spp sixteen/; s/^check point 4/check point 4 5/' tools/rubrics/template.rubric >"$tmp/wrong.rubric"
@@ -805,7 +807,7 @@ expect "grade: without bubblewrap it refuses" 3 "unsafe-no-sandbox" env PATH=/no
 if make -s BUILD="$plain" PREFIX="$tmp/usr" install >"$tmp/out" 2>&1; then ok "make install"; else
     not_ok "make install" "$(cat "$tmp/out")"
 fi
-# Installed below /usr, it is nothing that a submission's build could copy.
+# Installed below /usr, it is hidden from a submission's build, which would copy it.
 installed=/usr/local/assay-installed.$$
 if [ "$(id -u)" = 0 ] && make -s BUILD="$plain" PREFIX="$installed" install >"$tmp/out" 2>&1; then
     mkdir -p "$tmp/copies" && chmod 711 "$tmp"

@@ -1,6 +1,7 @@
 #!/bin/bash
-# tests/end_to_end/engines.sh BUILD: what the drivers of reference/engines write for programs that are not ours, held against another of our
-# exports; with libc-ray.so (LIBC_RAY or the loader's) c-ray renders. Prints "ok NAME", "not ok NAME: why" or "skip NAME".
+# tests/end_to_end/engines.sh BUILD: compares what the drivers of reference/engines write for other renderers with
+# another of our exports; if there is libc-ray.so (LIBC_RAY or the loader's) c-ray renders, too. Prints "ok NAME", "not
+# ok NAME: why" or "skip NAME".
 set -u
 build=$(realpath "${1:?usage: tests/end_to_end/engines.sh BUILD}")
 tmp=$(mktemp -d) top=$PWD
@@ -16,9 +17,10 @@ if ! python3 -c 'import numpy' 2>/dev/null; then
     exit 0
 fi
 
-# Scenes with lamps, a mirror, a ball; and a lens. c-ray's camera stays at the origin and looks along +Z with +X to the left, so a point of
-# the world is (-right, up, -backward) of its way from the eye, all of which stand in the dump for Cycles. A lamp's black back lies 1/10000
-# of its size behind it. The lens by c-ray's own formulas (cam_recompute_optics), the window by its angle.
+# Scenes with lamps, a mirror, a ball; and a lens. c-ray's camera stays at the origin and looks along +Z with +X to the
+# left, so a point has the coordinates (-right, up, -backward) of its offset from the eye, all of which are in the dump
+# for Cycles. A lamp's black back lies 1/10000 of its size behind it. The lens is checked by c-ray's own formulas
+# (cam_recompute_optics), the window by its angle.
 # translate NAME DAE OPTIONS: "$tmp/NAME" has what c-ray reads, "$tmp/NAME.json" the dump
 translate() {
     mkdir "$tmp/$1"
@@ -79,8 +81,8 @@ assay export --engine mitsuba -o "$tmp/point.xml" reference/scenes/12_point_plan
 expect "c-ray: a library that is not there is said" 1 "^c-ray.py: /nowhere.*LIBC_RAY says where it is" env LIBC_RAY=/nowhere python3 "$driver" "$tmp/box.xml" 1 1 "$tmp/x.exr"
 expect "c-ray: what it has not is said" 1 "^c-ray.py: c-ray has no light of the kind 'point'$" python3 "$driver" "$tmp/point.xml" DIR 1 "$tmp/box"
 
-# Images 1, 2 and 6 times x, which is a pixel's number and a quarter for each channel: the mean is 3 x, the squares of what is left 14 x^2,
-# the cubes (-8 - 1 + 27) x^3, here of pixel 4.
+# Images of 1, 2 and 6 times x, where x is a pixel's number plus a quarter for each channel: the mean is 3 x, the sum of
+# squared deviations 14 x^2, of cubed ones (-8 - 1 + 27) x^3; looked at in pixel 4.
 tell "c-ray: moments" "$(python3 - "$driver" "$tmp/m.exr" 2>&1 <<'END'
 import importlib.util, sys
 import numpy as np

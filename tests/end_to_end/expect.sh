@@ -1,5 +1,5 @@
-# For `source`, from the root of the checkout: lines "ok $what: NAME" and "not ok $what: NAME: why", the latter counted in $failures; without
-# $what only the name. Uses $tmp.
+# To be sourced from the root of the checkout: functions that print "ok $what: NAME" or "not ok $what: NAME: why"
+# (without $what only the name) and count the latter in $failures. Uses $tmp.
 # shellcheck shell=bash disable=SC2154
 
 tell() { # NAME WHY: not ok where WHY says something

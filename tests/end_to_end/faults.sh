@@ -1,8 +1,9 @@
 #!/bin/bash
-# tests/end_to_end/faults.sh BUILD [KILLS [PART...]]: what goes wrong, or is other, outside the program. kill -9 at KILLS random moments (6) each of a
-# render, a golden update, a grading batch, a report and a validation: no output is ever half written, going on ends with the bits
-# of an uninterrupted run. Full disk, read-only directory, closed pipe, a decimal comma. Prints "ok NAME" or "not ok NAME: why".
-# PARTs: kill_renders kill_golden kill_grading kill_report kill_validation disk clock comma ours_to_mend (all these; disk uses what grading and
+# tests/end_to_end/faults.sh BUILD [KILLS [PART...]]: faults of the environment. kill -9 at KILLS random moments (6)
+# each of a render, a golden update, a grading batch, a report and a validation: no output is ever half written, and
+# resuming ends with the bits of an uninterrupted run. Full disk, read-only directory, closed pipe, clock jumps, a
+# decimal comma, what grading may lack. Prints "ok NAME" or "not ok NAME: why". PARTs: kill_renders kill_golden
+# kill_grading kill_report kill_validation disk clock comma ours_to_mend (default: all these; disk uses what grading and
 # validation leave); memory: tests/end_to_end/no_memory.sh with every allocation (an hour).
 set -u
 build=$(realpath "${1:?usage: tests/end_to_end/faults.sh BUILD [KILLS [PART...]]}") kills=${2:-6}
@@ -17,7 +18,7 @@ RANDOM=1 # the moments are the same parts of a run in every run of this script
 
 what=""
 . tests/end_to_end/expect.sh
-# As many kills as asked for, of at most five times as many tries and 50: on a busy machine a program may end sooner than when it was timed.
+# More tries until $kills of them met the program, at most 5 $kills + 50: it may end sooner than when it was timed.
 more_kills() { [ "$hits" -lt "$kills" ] && [ "$1" -lt $((5 * kills + 50)) ]; }
 too_few() { [ "$hits" -eq "$kills" ] || echo "only $hits of $1 tries met the program"; }
 milliseconds() { echo $(($(date +%s%N) / 1000000)); }
@@ -32,8 +33,8 @@ killed() {
     [ $status -ne 137 ] && [ $status -ne 0 ] && echo "status $status: $(head -c 300 "$tmp/err")" >>"$tmp/why"
     return $status
 }
-# Moments of a file read back: they must have n of every pixel; the harness refuses to compare a file with itself in these
-# words only after reading it whole.
+# Can the moments of a file be read, n of every pixel included? The harness refuses to compare a file with itself in
+# these words only after reading all of it.
 is_whole() {
     "$assay" compare --margin 0.9 --margin-tile 0.9 "$1" "$1" 2>&1 | grep -q 'the same observations'
 }
@@ -99,7 +100,7 @@ kill_golden() {
         return
     fi
     make_candidates "$tmp/candidates"
-    # approve.c: the stored images themselves, not their dates.
+    # What `approve` stores; images are compared, not manifests, which have dates.
     local names
     names=$(ls "$tmp/candidates")
     mkdir -p "$tmp/first" && for name in $names; do cp -r "golden/$name" "$tmp/first"; done
@@ -158,7 +159,7 @@ kill_grading() {
     [ -z "$why" ] && ! cmp -s "$tmp/straight_grades/grades.csv" "$out/grades.csv" && why="other points at the end"
     tell "kill -9, $hits moments of a grading batch ($k tries): no half of a file, the same points at the end" "${why:-$(too_few $k)}"
 }
-# A JSON file is whole when its braces close; the last byte that is no blank says it, since all are objects.
+# A JSON file is taken for whole if its first and last bytes, blanks aside, are braces, as all are objects.
 json_is_whole() { [ "$(tr -d ' \n' <"$1" | tail -c 1)" = "}" ] && [ "$(tr -d ' \n' <"$1" | head -c 1)" = "{" ]; }
 assay_json=json_is_whole
 
@@ -199,7 +200,7 @@ kill_validation() {
     for file in $(cd "$tmp/straight_suite" && find . -name '*.png'); do
         cmp -s "$tmp/straight_suite/$file" "$dir/$file" || why="$file has other bits at the end"
     done
-    # Without the efficiency of the noise, which is of the CPU time.
+    # Without the efficiency in the table of noise, which depends on CPU time.
     "$assay" report --markdown "$tmp/straight_suite/results.json" | awk -F"|" 'NF == 10 { $8 = "" } 1' >"$tmp/a.md"
     "$assay" report --markdown "$dir/results.json" | awk -F"|" 'NF == 10 { $8 = "" } 1' >"$tmp/b.md"
     cmp -s "$tmp/a.md" "$tmp/b.md" || why="${why:-other verdicts at the end: $(diff "$tmp/a.md" "$tmp/b.md" | head -n 5)}"
@@ -220,7 +221,8 @@ refused() {
     elif ! cmp -s "$tmp/before" "$tmp/after"; then why="files changed: $(diff "$tmp/before" "$tmp/after" | head -n 3)"; fi
     tell "$name" "$why"
 }
-# limited LIMIT COMMAND...: no file may grow beyond LIMIT KiB, which is what a full disk is to a program, but for the word.
+# limited LIMIT COMMAND...: no file can grow beyond LIMIT KiB, which to a program is a full disk with another error
+# message.
 cat >"$tmp/limited" <<'END'
 #!/bin/bash
 trap '' XFSZ
@@ -296,7 +298,7 @@ memory() {
     tests/end_to_end/no_memory.sh --all "$build" || failures=$((failures + 1))
 }
 
-# --time, --write-every, Ctrl-C and the time limit of a program are measured by a clock that nobody sets.
+# --time, --write-every and Ctrl-C rely on a clock that nobody can set.
 clock() {
     local so=$tmp/clock.so why="" start took
     gcc -O1 -shared -fPIC -o "$so" tests/end_to_end/clock.c -ldl || why="cannot build it"
@@ -312,7 +314,7 @@ clock() {
     tell "clock jumps of an hour: --time, --write-every and Ctrl-C" "$why"
 }
 
-# A country where numbers have a decimal comma: every file and table is the same. Control: printf of the system writes a comma there.
+# A locale with a decimal comma: every file and table is the same. Control: the system's printf writes a comma in it.
 comma() {
     local why="" at
     export LOCPATH=$tmp/locale
@@ -338,8 +340,8 @@ comma() {
     tell "a decimal comma: the same files and tables" "${why:-$(diff "$tmp/comma/C.out" "$tmp/comma/de_DE.UTF-8.out")}"
 }
 
-# A right program whose grading lacks something: all points, or none are said and exit 3 with a line; never fewer. The control is a wrong
-# program that lacks nothing. With the sandbox where there is one, and without.
+# A right program, while grading lacks something: it gets all points, or no grade and exit 3 with a line; never fewer
+# points. Control: a wrong program while nothing is lacking. With the sandbox, where there is one, and without.
 ours_to_mend() {
     local mode n dir=$tmp/ours rubric=$tmp/ours/quick.rubric pid bare=--unsafe-no-sandbox
     chmod 711 "$tmp"
@@ -378,7 +380,7 @@ ours_to_mend() {
             umount "$dir/temp"
             tell "TMPDIR of 1 to 13 MB takes no points${mode:+, $mode}" "$([ $n -lt 7 ] || echo 'there was room every time')"
         else echo "skip TMPDIR of 1 to 13 MB: cannot mount one"; fi
-        # Without the sandbox there is none to kill: the process is the program, which may have killed itself.
+        # Only with the sandbox: without it there is no supervisor to kill, and a killed program may have killed itself.
         for k in $([ -n "$mode" ] || echo 1 2 3 4 5 6); do
             "${grade[@]}" >/dev/null 2>&1 &
             pid=$! && sleep 0.$k

@@ -1,7 +1,9 @@
 #!/bin/bash
-# tests/end_to_end/grading.sh BUILD: the class of "A graded submission in five minutes" (tools/docs/guide-course.md) and three
-# more students, one with ada's program under another name, one with a seed of her own, and one who hands in our reference with something added: points, whose noise it is, the same again on one processor
-# and two, and after an interruption; variants of a scene. Prints "ok NAME" or "not ok NAME: why".
+# tests/end_to_end/grading.sh BUILD: grades the class of "A graded submission in five minutes"
+# (tools/docs/guide-course.md) and three more students: cyd with ada's program, eve with a seed of her own, mal with our
+# reference plus further samples. Points; who has whose noise; the same grades on one processor and two, and after an
+# interruption; another rubric, appeals, one image for several scenes, variants of a scene. Prints "ok NAME" or "not ok
+# NAME: why".
 set -u
 build=$(realpath "${1:?usage: tests/end_to_end/grading.sh BUILD}")
 tmp=$(mktemp -d)
@@ -28,7 +30,7 @@ student eve --seed 77
 student mal -s 1300 --seed 11400714819323198485 # the reference (its seed can be read in answer_key.c) with 276 samples more
 rubric=tools/rubrics/template.rubric
 grade() { "$build/assay" grade -q "$@" "$rubric" "$tmp/submissions"/*; }
-# What is the same in every run: all but times.
+# Hash of what is the same in every run: all but times.
 sums() { (cd "$1" && cat */grade.json | grep -v '"cpu_s"\|"wall_s"' | sha256sum) | grep .; }
 points() { grep -q "^\"$1\",$2," "$tmp/two/grades.csv"; }
 

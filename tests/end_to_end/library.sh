@@ -1,6 +1,7 @@
 #!/bin/bash
-# tests/end_to_end/library.sh BUILD: libassay as others use it: installed, found by pkg-config, from C and C++, with no more symbols than
-# its header has; the Python package from the sources and by pip. Prints "ok NAME", "not ok NAME: why" or "skip NAME".
+# tests/end_to_end/library.sh BUILD: libassay as others use it: installed, found by pkg-config, from C and C++, with no
+# other symbols than its header's; the Python package from the sources and by pip. Prints "ok NAME", "not ok NAME: why"
+# or "skip NAME".
 set -u
 build=$(realpath "${1:?usage: tests/end_to_end/library.sh BUILD}")
 tmp=$(mktemp -d)
@@ -72,7 +73,7 @@ PYTHONPATH=$PWD/tools/python ASSAY_LIBRARY=$build/libassay.so.1 pytest "Python f
 tell "Python: without the library it says what to set" "$(PYTHONPATH=$PWD/tools/python ASSAY_LIBRARY=/nowhere.so $python -B -c 'import assay' 2>&1 |
     grep -q 'ImportError: cannot load libassay (set ASSAY_LIBRARY=PATH): /nowhere.so' || echo "another message")"
 
-# By pip, into an environment of its own, from a copy: what it makes is not to lie beside the sources.
+# By pip, into a virtual environment; it must leave nothing beside the sources.
 if $python -c 'import venv, ensurepip, setuptools, wheel' 2>/dev/null && $python -m venv --system-site-packages "$tmp/venv" >"$tmp/pip.log" 2>&1; then
     git status --porcelain --ignored -- tools >"$tmp/before"
     "$tmp/venv/bin/pip" install --no-build-isolation --no-index tools/python >>"$tmp/pip.log" 2>&1

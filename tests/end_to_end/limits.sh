@@ -1,6 +1,7 @@
 #!/bin/bash
-# tests/end_to_end/limits.sh BUILD: what a file or a command line may ask for has a limit: one line that says so, exit 3 and no output file,
-# within 20 s and 8 GiB of addresses. Prints "ok NAME" or "not ok NAME: why". (COLLADA's own faults are tests/bad.)
+# tests/end_to_end/limits.sh BUILD: what a file or a command line asks for is limited: beyond that one line says so,
+# with exit status 3 and no output file, within 20 s and 8 GiB of address space. Prints "ok NAME" or "not ok NAME: why".
+# (Faults of COLLADA files: tests/bad.)
 set -u
 build=$(realpath "${1:?usage: tests/end_to_end/limits.sh BUILD}")
 pathtracer=$build/pathtracer assay=$build/assay scene=reference/scenes/41_cornell.dae
@@ -59,7 +60,7 @@ for kind in exr hdr; do
     render "a sky of 10^6 x 10^6, $kind" "big.$kind: cannot read" -e "$tmp/big.$kind"
 done
 
-# 2 MB that inflate to 2 GB behind the 64 x 64 pixels of a PNG, which is refused; and the same in its texts, which are left out.
+# A PNG of 64 x 64 pixels with 2 MB that inflate to 2 GB behind them is refused; the same in its texts is skipped.
 png() { # FILE BYTES TEXTS: an image with so many bytes in its stream, and texts of a MB each
     python3 - "$@" <<'END'
 import struct, sys, zlib
@@ -88,7 +89,7 @@ if png "$tmp/right.png" $((64 * 193)) 1; then
     ulimit -S -t unlimited
 else echo "skip limits: PNG files that inflate to more: no python3"; fi
 
-# What would be waited for, or has no end, wherever a file is read; a results.json may name it.
+# Files that block or never end, wherever a file is read; a results.json may name such a file.
 mkfifo "$tmp/fifo.exr" "$tmp/fifo.png" "$tmp/fifo.json" "$tmp/fifo.rubric" "$tmp/fifo.dae" "$tmp/fifo.info"
 refused "a FIFO as EXR" "fifo.exr: cannot read: Operation not supported" "$assay" compare "$tmp/fifo.exr" "$tmp/fifo.exr"
 refused "a FIFO as PNG" "fifo.png: cannot read: Operation not supported" "$assay" compare --curve srgb "$tmp/fifo.png" "$tmp/fifo.png"
@@ -101,7 +102,7 @@ render "a FIFO as a camera" "fifo.info: cannot read: Operation not supported" -c
 refused "a device as a scene" "zero: cannot read: Operation not supported" "$pathtracer" -q -f "$tmp/out.exr" /dev/zero
 refused "a FIFO as appeals" "fifo.info: Operation not supported" "$assay" grade --unsafe-no-sandbox -q -o "$tmp/grades" --appeals "$tmp/fifo.info" tests/end_to_end/quick.rubric "$tmp"
 
-# Nesting, and texts without end.
+# Deep nesting, huge numbers, long texts.
 head -c 100000 /dev/zero | tr '\0' '[' >"$tmp/deep.json"
 refused "results nested 10^5 deep" "deep.json:1: maximum parsing depth" "$assay" report "$tmp/deep.json"
 refused "an engine nested 10^5 deep" "deep.json:1: maximum parsing depth" "$assay" validate --only 12_point_plane -o "$tmp/out.d" --engine "$tmp/deep.json"

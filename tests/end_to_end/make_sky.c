@@ -1,5 +1,6 @@
-/* make_sky SCENE.json WIDTH HEIGHT OUT.exr: the environment map of a scene of kind "sky_gradient" from
- * the numbers of its closed form. reference/scenes/35_sky_gradient.exr was made so, with 64 32. */
+/* make_sky SCENE.json WIDTH HEIGHT OUT.exr: writes the environment map of a scene whose closed form
+ * is a sky gradient, from its numbers. reference/scenes/35_sky_gradient.exr was made so, with 64
+ * 32. */
 #include "reference/truth/truth_sky.h"
 #include "renderer/image/image.h"
 

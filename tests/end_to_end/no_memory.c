@@ -1,13 +1,15 @@
-/* Memory that runs out, over whole commands. Linked with -Wl,--wrap=main into a program of its own, this is its malloc() and kin: with
- * NO_MEMORY=DIR in the environment the program runs its command once to count the allocations, those of libraries included, and then
- * once more for each of them, which fails. Each run is a fork() in DIR/run, a new copy of DIR/start (if any), which may
- *   - end as the first did, with the same files and the same words, or
- *   - exit 3 with one line that speaks of memory, or 2 with a list that does (a grade that is left to staff); each file that is there is
- *     one of the first run or of DIR/start, or says it itself;
- * it may not crash, hang or (under LeakSanitizer) leak. Prints "ok NAME: ..." or "not ok NAME: why", NAME being NO_MEMORY_NAME.
- * Unless NO_MEMORY_ALL is set, of the allocations asked for through the same calls only the first and the last fail, of these at most
- * NO_MEMORY_MOST of libraries and three times as many of our own code, and none through calls that NO_MEMORY_DONE has from the commands before.
- * NO_MEMORY_FAULT=NAME runs faulty_main() in the program's place, which has to be seen. Clocks stand still. */
+/* Whole commands while memory runs out. Linked into a program with -Wl,--wrap=main, this file is its malloc(), free()
+ * and the like: with NO_MEMORY=DIR in the environment the program runs its command once to count the allocations,
+ * those of libraries included, and then once for each of them, which fails. Each run is a fork() in DIR/run, a new
+ * copy of DIR/start (if any), which may
+ *   - end as the first did, with the same files and the same output, or
+ *   - exit 3 with one line that speaks of memory, or 2 with a list that does (a grade that is left to staff); each
+ *     file there must then be one of the first run or of DIR/start, or speak of memory itself;
+ * it must not crash, hang or (under LeakSanitizer) leak. Prints "ok NAME: ..." or "not ok NAME: why", NAME being
+ * NO_MEMORY_NAME. Unless NO_MEMORY_ALL is set, of the allocations with the same call stack only the first and the
+ * last fail; of these at most NO_MEMORY_MOST of libraries and three times as many of our own code; and none whose
+ * stack is in the file NO_MEMORY_DONE, which earlier commands have filled. NO_MEMORY_FAULT=NAME runs faulty_main() in
+ * the program's place: its fault has to be found. Clocks stand still. */
 #define _GNU_SOURCE
 #include "tests/support/malloc_below.h"
 
@@ -42,7 +44,7 @@ enum {
     EXIT_NOT_JUDGED = 3
 };
 
-/* The allocators of a process are one for all its threads. */
+/* State of the allocator, common to all threads. */
 static atomic_bool armed;
 static atomic_long count; /* of the calls while armed */
 static _Thread_local bool spared;
@@ -51,12 +53,12 @@ static long fail_at; /* 0: none fails, and `seen` is written */
 static struct shared {
     long count;
     int num_frames;
-    char module[4096];              /* that the first run opened late; "": none */
+    char module[4096];              /* library that the first run loaded late; "": none */
     uintptr_t frame[MAX_FRAMES];    /* of the call that failed */
     uint64_t seen[MAX_ALLOCATIONS]; /* hash of the calls that led to each allocation */
 } * shared;
 
-/* backtrace() would want memory. */
+/* Not backtrace(), which allocates. */
 static _Unwind_Reason_Code keep_frame(struct _Unwind_Context *context, void *arg)
 {
     struct shared *s = arg;
@@ -64,9 +66,9 @@ static _Unwind_Reason_Code keep_frame(struct _Unwind_Context *context, void *arg
     return ++s->num_frames < MAX_FRAMES ? _URC_NO_REASON : _URC_END_OF_STACK;
 }
 
-/* Of the calls that led here, the same in every run, odd where our own code asks; 0 within
- * C++ and OpenImageIO, which may end the program or call
- * a file unreadable. Not inline: AddressSanitizer allocates before it can follow a variable whose address is taken. */
+/* A hash of the call stack, the same in every run; odd if our own code asks. 0 within C++ and
+ * OpenImageIO, which may end the program or call a file unreadable: such allocations do not fail.
+ * Not inline: AddressSanitizer allocates before it can follow a variable whose address is taken. */
 static __attribute__((noinline)) uint64_t hash_of_frames(const struct shared *s)
 {
     uint64_t hash = 14695981039346656037u, ours = 1;
@@ -101,7 +103,7 @@ static bool fails(void)
     if (fail_at == 0 && n < MAX_ALLOCATIONS)
         shared->seen[n] = hash;
     spared = false;
-    const bool now = fail_at != 0 && hash != 0; /* with threads it may be another's turn */
+    const bool now = fail_at != 0 && hash != 0; /* hash 0: with threads it may be another one */
     if (now)
         errno = ENOMEM;
     return now;
@@ -143,7 +145,7 @@ int posix_memalign(void **p, size_t alignment, size_t size)
         *p = q;
     return q != NULL ? 0 : ENOMEM;
 }
-/* AddressSanitizer's own do not call malloc(). */
+/* AddressSanitizer's strdup() and strndup() do not call malloc(). */
 char *strndup(const char *s, size_t n)
 {
     const size_t length = strnlen(s, n);
@@ -159,7 +161,7 @@ char *strdup(const char *s)
     return strndup(s, SIZE_MAX - 1);
 }
 
-/* Libraries of C++ end the program where their own beginnings find no memory. */
+/* C++ libraries end the program if their initialisation finds no memory: they are spared. */
 extern void *__real_dlopen(const char *name, int flags);
 void *__wrap_dlopen(const char *name, int flags);
 void *__wrap_dlopen(const char *name, int flags)
@@ -171,7 +173,7 @@ void *__wrap_dlopen(const char *name, int flags)
     spared = false;
     return module;
 }
-/* AddressSanitizer does where it asks for the place of a thread's stack. */
+/* So does AddressSanitizer if this call fails, by which it finds a thread's stack. */
 int pthread_getattr_np(pthread_t thread, pthread_attr_t *attr)
 {
     int (*next)(pthread_t, pthread_attr_t *);
@@ -182,7 +184,8 @@ int pthread_getattr_np(pthread_t thread, pthread_attr_t *attr)
     return error;
 }
 
-/* Threads that libraries begin when they are loaded before fork() are not AddressSanitizer's: it would look for them in each child. */
+/* Threads that libraries start when loaded before fork() are hidden from AddressSanitizer, which
+ * would look for them in each child. */
 static bool loading;
 int pthread_create(pthread_t *thread, const pthread_attr_t *how, void *(*run)(void *), void *arg)
 {
@@ -195,7 +198,7 @@ int pthread_create(pthread_t *thread, const pthread_attr_t *how, void *(*run)(vo
     return next(thread, how, run, arg);
 }
 
-/* What chance or a clock says would be in outputs. */
+/* Random names and times would be in the outputs: here they are fixed. */
 char *mkdtemp(char *path)
 {
     char *last = path + strlen(path) - 6;
@@ -236,8 +239,9 @@ pid_t __wrap_wait4(pid_t child, int *status, int options, struct rusage *usage)
     return ended;
 }
 
-/* libxml2's writer and gsl_cheb_alloc() lose a block themselves when they fail. What the dynamic linker keeps of a library that is
- * opened late lies, from glibc 2.41 on, where the search for leaks does not look. */
+/* libxml2's writer and gsl_cheb_alloc() leak a block when they fail. What the dynamic linker keeps
+ * of a library loaded late lies, from glibc 2.41 on, where LeakSanitizer does not look for
+ * pointers. */
 const char *__lsan_default_suppressions(void), *__lsan_default_options(void);
 int __lsan_is_turned_off(void);
 extern void __lsan_do_leak_check(void) __attribute__((weak));
@@ -251,7 +255,8 @@ const char *__lsan_default_options(void)
     return "print_suppressions=0";
 }
 
-/* The search takes two thirds of a run's time: without NO_MEMORY_ALL only where an allocation of our own code failed. */
+/* The search for leaks takes two thirds of a run's time: without NO_MEMORY_ALL it is done only if
+ * an allocation of our own code failed. */
 int __lsan_is_turned_off(void)
 {
     return getenv("NO_MEMORY_ALL") == NULL && (fail_at == 0 || shared->seen[fail_at - 1] % 2 == 0);
@@ -264,7 +269,8 @@ static bool write_file(const char *text)
     return f >= 0 && close(f) == 0 && ok;
 }
 
-/* A program that does wrong what `fault` says. volatile: what the compiler cannot see through. */
+/* A program with the fault of that name, or "none". volatile, so that the compiler does not remove
+ * the fault. */
 static int faulty_main(const char *fault)
 {
     static char *volatile kept;
@@ -293,7 +299,7 @@ extern int __real_main(int, char **, char **);
 int __wrap_main(int argc, char **argv, char **env);
 
 static char why[300];    /* what was wrong with a run */
-static bool failed;      /* whether it may have other files than the first run */
+static bool failed;      /* the run ended otherwise than the first, so may have other files */
 static const char *line; /* what a failed run said */
 static int num_entries;
 
@@ -347,7 +353,7 @@ static bool is_as_in(const char *tree, const char *path, int type)
     return type == FTW_F ? same_files(path, other) : access(other, F_OK) == 0;
 }
 
-/* OpenEXR has its own words; of zlib, which it asks, it does not know why. */
+/* Does the text speak of memory? OpenEXR has its own words, and does not know why zlib failed. */
 static bool says_it(const char *text)
 {
     return strstr(text, "out of memory") != NULL || strstr(text, "allocate memory") != NULL ||
@@ -356,8 +362,9 @@ static bool says_it(const char *text)
            strstr(text, "Unable to decompress") != NULL;
 }
 
-/* Directories of work and images that wait for their manifest, of which the next run knows: where the line names them, or where
- * jansson ends the program (tools/commands/assay.c). */
+/* May a failed run leave this entry? Yes for directories of work, and images that wait for their
+ * manifest, which the next run cleans up, if the line names them or jansson ended the program
+ * (tools/commands/assay.c). */
 static bool may_be_left(const char *path)
 {
     const char *end = path + strlen(path);
@@ -374,7 +381,8 @@ static bool may_be_left(const char *path)
                       strcmp(end - 5, ".next") == 0);
 }
 
-/* Results that say what could not be judged, and end as they have to. */
+/* Is the file complete, and does it speak of memory, as results do that list what could not be
+ * judged? */
 static bool is_whole_and_says_it(const char *path)
 {
     static char text[1 << 18];
@@ -402,7 +410,8 @@ static int count_entry(const char *path, const struct stat *s, int type, struct 
     return 0;
 }
 
-/* Ends a process before libraries that were loaded before fork() do so: some wait for threads of theirs, which a child has not. */
+/* Ends a child before the exit handlers of libraries that were loaded before fork(): some wait for
+ * threads that it lacks. */
 static void end_here(int code, void *unused)
 {
     (void)unused;
@@ -412,7 +421,7 @@ static void end_here(int code, void *unused)
     _exit(code);
 }
 
-/* Ends the child that it is called in. */
+/* Runs the command, allocation `at` failing (0: none), and ends this child. */
 static void run_here(long at, int argc, char **argv, char **env)
 {
     const char *fault = getenv("NO_MEMORY_FAULT");
@@ -431,7 +440,7 @@ static void run_here(long at, int argc, char **argv, char **env)
     exit(code);
 }
 
-/* The wait() status of one run. */
+/* run_here() in a child and a fresh directory; returns its wait() status. */
 static int run_command(long at, int argc, char **argv, char **env)
 {
     nftw("run", remove_entry, 16, FTW_DEPTH | FTW_PHYS);
@@ -451,7 +460,7 @@ static int run_command(long at, int argc, char **argv, char **env)
     return status;
 }
 
-/* The words of a failed run after those that the first one said too. */
+/* What a failed run said after the lines that the first run said, too. */
 static const char *own_words(const char *said)
 {
     char all[4096];
@@ -526,7 +535,7 @@ int __wrap_main(int argc, char **argv, char **env)
     if (shared == MAP_FAILED || chdir(dir) != 0)
         abort();
     int right = run_command(0, argc, argv, env);
-    /* It brings 230 libraries along: they are there when the other runs begin. */
+    /* oiio.so brings 230 libraries along: they are loaded once, before the other runs fork. */
     if (shared->module[0] != '\0') {
         loading = true;
         if (__lsan_disable != NULL)

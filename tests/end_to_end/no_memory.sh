@@ -1,14 +1,15 @@
 #!/bin/bash
-# tests/end_to_end/no_memory.sh [--all] BUILD [CASE...]: whole commands while memory runs out, each on tiny inputs: every allocation fails in a run of its
-# own, as tests/end_to_end/no_memory.c says, whose faults have to be seen first. Without --all of each command at most 12 allocations of libraries and 36 of our own
-# code, asked for through other calls than any before. CASE: a pattern of the names of some. Prints "ok NAME" or "not ok NAME: why".
+# tests/end_to_end/no_memory.sh [--all] BUILD [CASE...]: whole commands while memory runs out, each on tiny inputs:
+# every allocation fails in a run of its own, as described in tests/end_to_end/no_memory.c, whose planted faults have to
+# be found first. Without --all, for each command at most 12 allocations of libraries and 36 of our own code, with call
+# stacks that no earlier command had. CASE: a pattern of names. Prints "ok NAME" or "not ok NAME: why".
 set -u
 [ "${1:-}" = --all ] && export NO_MEMORY_ALL=1000000 && shift
 build=$(realpath "${1:?usage: tests/end_to_end/no_memory.sh [--all] BUILD [CASE...]}")
 shift
 wanted=("${@:-*}")
 pathtracer=$build/san/no_memory/pathtracer assay=$build/san/no_memory/assay
-# Makes the inputs, and is what the commands themselves run; its clocks stand still too.
+# Renders the inputs, and is the renderer that the commands themselves run; its clocks stand still, too.
 plain=$(realpath "${PLAIN_BUILD:-$build}")/no_memory/pathtracer
 root=$PWD scenes=$PWD/reference/scenes seeds=$PWD/tests/fuzz/seeds
 tmp=$(mktemp -d)
@@ -78,7 +79,7 @@ for format in json pov xml pbrt; do no_memory "export: $format" "$assay" export 
 for format in json pov; do no_memory "export: textures, $format" "$assay" export -o x.$format "$scenes/29_textures.dae"; done
 for format in json pov xml; do no_memory "export: a sky, $format" "$assay" export -o x.$format "$scenes/46_sky.dae"; done
 
-# OpenImageIO, which reads what is no moments file, takes half a second to load: fewer.
+# OpenImageIO, which reads all but moments files, takes half a second to load: fewer allocations there.
 versus=("$assay" compare -t 1 --alpha 0.01) # one thread: allocations come in the same order each time
 no_memory "compare: moments" "${versus[@]}" --margin 0.3 --margin-tile 0.9 --json x.json "$tmp/in/1.exr" "$tmp/in/2.exr"
 no_memory "compare: variance, two stages" "${versus[@]}" --margin-variance 0.9 --again "$tmp/in/r1/1.exr" "$tmp/in/r2/1.exr" -- "$tmp/in/1.exr" "$tmp/in/2.exr"
@@ -90,7 +91,7 @@ no_memory "compare: whole images exchanged" "${versus[@]}" --exchangeable "$tmp/
 most=5
 no_memory "compare: PNG" "${versus[@]}" --curve srgb "$tmp/in/1.png" "$tmp/in/2.png"
 
-# A suite of one scene; in the engines' places our own program renders an image for each seed.
+# A suite of one scene; in place of the engines our own program renders an image for each seed.
 mkdir suite && cp "$square" suite
 cat >suite/13_square_patch.json <<END_OF_SCENE
 {"title": "Plane", "detects": "much", "blind_to": "the rest", "width": 16, "height": 16, "depth": 1, "spp": 8, "tile": 8, "expect": "EQUIVALENT",

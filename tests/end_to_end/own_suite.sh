@@ -1,7 +1,7 @@
 #!/bin/bash
-# tests/end_to_end/own_suite.sh BUILD: the guide to a suite of one's own, command by command, in an empty folder, with the program installed
-# and with a renderer that is not ours; what else a suite.json may ask for; the workflow that `assay init` writes. Prints "ok NAME",
-# "not ok NAME: why" or "skip NAME".
+# tests/end_to_end/own_suite.sh BUILD: runs the guide to a suite of your own, command by command, in an empty folder,
+# with the installed program and with a renderer that is not ours; tests what else a suite.json may ask for, and the
+# workflow that `assay init` writes. Prints "ok NAME", "not ok NAME: why" or "skip NAME".
 set -u
 build=$(realpath "${1:?usage: tests/end_to_end/own_suite.sh BUILD}")
 tmp=$(mktemp -d) top=$PWD
@@ -13,7 +13,8 @@ make -s install BUILD="$build" PREFIX="$tmp/usr" >"$tmp/install.log" 2>&1
 tell "it installs" "$([ -x "$tmp/usr/bin/assay" ] || tail -n 3 "$tmp/install.log")"
 export PATH=$tmp/once:$tmp/usr/bin:/usr/bin:$PATH
 mkdir "$tmp/walk" "$tmp/free" "$tmp/once" "$tmp/rendered"
-# once OUT PROGRAM ARGUMENT...: renders OUT, unless the same command has on the same contents of files; then it is a copy of that.
+# once OUT PROGRAM ARGUMENT...: renders OUT, or copies it if the same command was run before on the same contents of
+# files.
 cat >"$tmp/once/once" <<END
 #!/bin/bash
 out=\$1
@@ -27,12 +28,12 @@ if [ ! -f "\$key" ]; then
 fi
 cp "\$key" "\$out"
 END
-# tracer.py of the guide.
+# So does python3 for the guide's tracer.py.
 printf '#!/bin/bash\n[[ $1 == */tracer.py ]] && exec once "$7" /usr/bin/python3 "$@"\nexec /usr/bin/python3 "$@"\n' >"$tmp/once/python3"
 chmod +x "$tmp/once"/*
 cd "$tmp/free" || exit 1
 
-# A folder that works, wherever one stands.
+# `assay init` makes a folder that works from any directory.
 expect "init" 0 "\`assay validate --suite .*/free/begun\` is green" assay init "$tmp/free/begun"
 sed -i 's/^exec pathtracer/exec once "$7" pathtracer/' begun/mine.sh # the same images are wanted again and again from here on
 expect "init does not write over what is there" 3 "begun/suite.json is there already" assay init begun
@@ -118,8 +119,9 @@ expect "an engine's own margin widens those of the scenes" 0 "^mine declares mar
     env -C wide assay validate -q
 tell "the page says so" "$(grep -q 'mine declares margins of its own, 30 % of an image and 90 % of a tile.*: its paths are &lt;short&gt;' wide/build/report/index.html || echo "it does not")"
 
-# One long render of a program without seeds: of its own former release it has the same bits; a bug in it (16 % too dark) is found by the
-# noise of the difference. H0: the images are the same; alpha 1e-3 for the run, fixed seeds.
+# A renderer without seeds is judged by one long render: it has the same bits as its former release; a bug (16 % too
+# dark) stands out of the noise that the difference itself shows. H0: the images are the same; alpha 1e-3 for the run,
+# fixed seeds.
 cp -r begun quiet
 echo '{"name": "mine", "format": "file", "output": "noisy", "spp": 1024, "command": ["./mine.sh", "{scene}", "{width}", "{height}", "{spp}", "{depth}", "1", "{out}"]}' >quiet/mine.json
 sed -i 's/0.01/0.03/; s/"mine-1.0": {}/"mine-2.0": {}/; s/"width": 64, "height": 64/"width": 192, "height": 192/' quiet/suite.json
@@ -136,7 +138,7 @@ if ! python3 -c 'import numpy' 2>/dev/null; then
     echo "skip own suite: the guide (no python3-numpy)"
     exit $((failures > 0))
 fi
-# The guide: indented lines, but what programs print.
+# The guide's commands: its indented lines, without what programs print.
 cd "$tmp/walk" || exit 1
 cp "$top/tests/end_to_end/tracer.py" .
 echo '{"floor": [0.5, 0.5, 0.5], "lamp": {"height": 3, "size": 1, "radiance": 20}, "balls": [{"at": [0, 0.5, 0], "radius": 0.5, "albedo": [0.7, 0.3, 0.2]}]}' >ball.json
@@ -151,7 +153,7 @@ tell "the guide: green, red, green" "$(grep -oE '^result: (all as it should be, 
 tell "CI has the line where it is wrong" "$(grep -q '^::error title=ball.*DIFFERENT, expected EQUIVALENT' first.out || grep '^::' first.out)"
 tell "control: no other line of the guide fails" "$(grep -c '^status' first.out | grep -vx 1)"
 
-# Each step of the workflow, in a repository as it asks for.
+# Each step of the workflow, in a repository laid out as it expects.
 mkdir "$tmp/bin"
 ln -s "$top" assay
 printf '#!/bin/sh\n' | tee build.sh >"$tmp/bin/apt-get"

@@ -1,6 +1,7 @@
 #!/bin/bash
-# tests/end_to_end/packaging.sh BUILD: manual pages and completions say what --help says; Debian packages hold what runs outside any
-# checkout. Prints "ok NAME", "not ok NAME: why" or "skip NAME". `make distros` has them installed in fresh roots.
+# tests/end_to_end/packaging.sh BUILD: manual pages and completions say what --help says; what Debian packages hold runs
+# outside any checkout. Prints "ok NAME", "not ok NAME: why" or "skip NAME". `make distros` installs the packages in
+# fresh root directories.
 set -u
 build=$(realpath "${1:?usage: tests/end_to_end/packaging.sh BUILD}")
 tmp=$(mktemp -d)
@@ -28,7 +29,7 @@ else
 fi
 expect "did you mean" 3 "did you mean validate?" "$build/assay" valdiate
 
-# Each step of the workflow, in a repository as it asks for, whose renderer is right, and then is not.
+# Each step of the workflow, in a repository laid out as it expects, whose renderer is right at first and then wrong.
 mkdir "$tmp/repository" "$tmp/bin"
 ln -s "$PWD" "$tmp/repository/assay"
 printf '#!/bin/sh\n' | tee "$tmp/repository/build.sh" >"$tmp/bin/apt-get" # installs nothing here

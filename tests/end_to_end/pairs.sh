@@ -1,7 +1,7 @@
 #!/bin/bash
-# tests/end_to_end/pairs.sh BUILD: the scenes 5x and 6x are what reference/pairs/pairs.py writes, hold the pairs that their page says, and
-# levels that are switched off are seen; other ways to the same images agree. All levels and ways: make pairs.
-# Prints "ok NAME" or "not ok NAME: why".
+# tests/end_to_end/pairs.sh BUILD: the scenes 5x and 6x are what reference/pairs/pairs.py writes and cover the pairs
+# that their page lists; switching a level off changes images; other ways to the same images agree. All levels and ways:
+# make pairs. Prints "ok NAME" or "not ok NAME: why".
 set -u
 build=$(realpath "${1:?usage: tests/end_to_end/pairs.sh BUILD}")
 tmp=$(mktemp -d)

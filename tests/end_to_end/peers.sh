@@ -1,6 +1,7 @@
 #!/bin/bash
-# tests/end_to_end/peers.sh: loads each scene of tools/rubrics/ in each program of the course in $PEERS/*/build/pathtracer: an image has to be
-# written within a time limit. Prints "ok NAME", "not ok NAME: why" or "skip NAME: why".
+# tests/end_to_end/peers.sh: loads each scene of tools/rubrics/ in each of the course's programs
+# $PEERS/*/build/pathtracer, which have to write an image within a time limit. Prints "ok NAME", "not ok NAME: why" or
+# "skip NAME: why".
 set -u
 shopt -s nullglob
 programs=()
@@ -17,7 +18,8 @@ for p in "${programs[@]}"; do
     wrong=
     for scene in "$PWD"/tools/rubrics/*.dae; do
         name=$(basename "$scene" .dae)
-        # Triangles whose centres agree: not every hierarchy is done with them, and that is asked there (course-skeleton.md).
+        # Its triangles have one centre, on which not every program's hierarchy ends: that is what it tests
+        # (course-skeleton.md).
         [ "$name" = stack ] && continue
         rm -f "$tmp/out.png"
         # A library that staff prebuilt, where the course gives one.
@@ -28,7 +30,7 @@ for p in "${programs[@]}"; do
     done
     if [ -z "$wrong" ]; then echo "ok peers: $(basename "$home") loads every scene"; else echo "not ok peers: $(basename "$home"): $wrong"; fi
 done
-# Does a scene that the starter code cannot read count as one?
+# Control: a scene that the starter code cannot read does not count as loaded.
 sed 's/<geometry id="floor-mesh" name="floor">/<geometry id="floor-mesh">/' tools/rubrics/matt.dae >"$tmp/nameless.dae"
-{ (cd "$tmp" && timeout $seconds "${programs[0]}" -t 1 -s 1 -r 64 48 -f nameless.png nameless.dae) >/dev/null; } 2>/dev/null # that it crashed, too
+{ (cd "$tmp" && timeout $seconds "${programs[0]}" -t 1 -s 1 -r 64 48 -f nameless.png nameless.dae) >/dev/null; } 2>/dev/null # hides the shell's message of a crash
 if [ -e "$tmp/nameless.png" ]; then echo "not ok peers: a geometry without a name was loaded"; else echo "ok peers: a geometry without a name is not loaded"; fi

@@ -1,6 +1,6 @@
 #!/bin/bash
-# tests/end_to_end/reproduce.sh BUILD: `assay reproduce` makes renders, stored references and results again, and sees what is not the same.
-# Prints "ok NAME" or "not ok NAME: why".
+# tests/end_to_end/reproduce.sh BUILD: `assay reproduce` makes renders, stored references and results again, and finds
+# what differs. Prints "ok NAME" or "not ok NAME: why".
 set -u
 build=$(realpath "${1:?usage: tests/end_to_end/reproduce.sh BUILD}")
 pathtracer=$build/pathtracer assay=$build/assay scene=reference/scenes/41_cornell.dae
@@ -29,7 +29,7 @@ again() { # NAME ARGUMENT...
     expect "$name" 0 "the same bits in all" "$tmp/x.exr"
 }
 again "a render" -s 5 -t 3 $scene
-# The file that is looked at stays as it is, also where its name hangs on its option.
+# The file that is checked stays as it is, even if its name follows its option without a blank.
 "$pathtracer" -qHs4 -r 16 16 -f"$tmp/together.exr" $scene >/dev/null
 cp "$tmp/together.exr" "$tmp/together.was"
 expect "short options together" 0 "the same bits in all" "$tmp/together.exr"
@@ -65,7 +65,7 @@ rm "$tmp/x.exr"
     "$assay" run-job "$tmp/plan" 0 1 2 >/dev/null && "$assay" gather "$tmp/plan" >/dev/null
 expect "of sample ranges" 0 "the same bits in all" "$tmp/x.exr"
 
-# A PNG is the same file by another name, on other threads, beside other outputs.
+# A PNG has the same bytes under another name, with another number of threads, and beside other outputs.
 rule=(-s 24 -a 4 0.3)
 render "$tmp/p.png" "${rule[@]}" --heatmap "$tmp/heat.png" $scene
 "$pathtracer" -f "$tmp/other.exr" -t3 --aov -r 24 16 "${rule[@]}" --keep-state --heatmap "$tmp/other_heat.png" -f "$tmp/another.png" $scene >/dev/null 2>&1
@@ -73,7 +73,7 @@ why=$(cmp "$tmp/p.png" "$tmp/another.png" 2>&1; cmp "$tmp/p_rate.png" "$tmp/anot
 tell "PNG: the same bytes by another name, on other threads, beside other outputs" "$why"
 expect "PNG" 3 "p.png: cannot read: " "$tmp/p.png"
 
-# What is not the same.
+# Files that differ, or cannot be made again.
 if command -v oiiotool >/dev/null; then
     oiiotool "$tmp/a.exr" --addc 0,0,0,0,0,0,0,0,0.0001,0 -o "$tmp/other.exr" && expect "one channel was changed" 1 "384 of 3840 values DIFFER, first M3" "$tmp/other.exr"
     oiiotool "$tmp/a.exr" --sattrib assay:seed 2 -o "$tmp/other.exr" && expect "another seed is claimed" 3 "assay:seed was '2', and is '1'" "$tmp/other.exr"
@@ -97,7 +97,7 @@ expect "two files" 3 "takes one file" README.md README.md
 expect "a file that is not there" 3 "nowhere.exr: cannot read" "$tmp/nowhere.exr"
 expect "a number of threads that is none" 3 "--threads" -t x README.md
 
-# Results: of a validation, a comparison and a convergence; then with a value that no run of it has.
+# Results of a validation, a comparison and a convergence; then with a value changed.
 altered() { # FILE NAME: every number of that name with another first digit
     sed -E "s/(\"$2\": -?)[0-9]/\\17/" "$1" >"$1.new" && mv "$1.new" "$1"
 }
@@ -137,7 +137,7 @@ for file in index.html junit.xml; do
     expect "a page, a table: $file" 3 "$file: cannot read: " "$tmp/report/$file"
 done
 
-# Results may name programs and come from anybody.
+# Results may come from anybody, and name programs to run.
 cat >"$tmp/evil" <<END
 #!/bin/sh
 touch "$tmp/it_ran"
@@ -181,7 +181,7 @@ if env PATH=/nowhere "$assay" reproduce golden/12_point_plane/cycles.exr >"$tmp/
 else
     echo "ok reproduce: a reference without its engine"
 fi
-# Of one that is made here: on other processors Blender's bits are others.
+# A reference made on this machine, as Blender's bits differ between processors.
 if command -v blender >/dev/null; then
     "$assay" reference --only 12_point_plane --engine cycles --fresh --seed 7 -o "$tmp/golden" >/dev/null 2>&1
     expect "a reference by Cycles" 0 "the same bits in all" "$tmp/golden/12_point_plane/cycles.exr"
@@ -189,7 +189,7 @@ else
     echo "skip reproduce: a reference by Cycles (needs Blender)"
 fi
 
-# What an interrupted render says to go on with, also behind a "--".
+# The command that an interrupted render prints resumes it, also with a "--" in it.
 interrupted() { timeout --preserve-status -s INT 1 "$@" 2>&1 >/dev/null; }
 said=$(interrupted "$pathtracer" -q -r 16 16 -s 16777216 -f "$tmp/long.exr" -- $scene)
 # It is one line of words that a shell reads.

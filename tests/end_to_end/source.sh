@@ -1,7 +1,8 @@
 #!/bin/bash
-# tests/end_to_end/source.sh BUILD: submissions of sources, which are built in the sandbox: what may go wrong with each is told once,
-# in grade.json's "state" and "wrong", and by the exit status 2. The program writes the furnace's closed form
-# (reference/scenes/10_furnace_one.md) or fails as its student made it. Prints "ok NAME", "not ok NAME: why" or "skip NAME: why".
+# tests/end_to_end/source.sh BUILD: submissions of sources, which are built in the sandbox: whatever goes wrong is
+# reported once, in grade.json's "state" and "wrong", and by the exit status 2. Each student's program writes the
+# furnace's closed form (reference/scenes/10_furnace_one.md) or fails in its own way. Prints "ok NAME", "not ok NAME:
+# why" or "skip NAME: why".
 set -u
 build=$(realpath "${1:?usage: tests/end_to_end/source.sh BUILD}")
 tmp=$(mktemp -d)
@@ -114,7 +115,7 @@ if ! grade probe "$tmp/make.rubric" "$tmp/class/right" >"$tmp/out" 2>&1 && grep 
     echo "skip source: submissions of sources ($(cat "$tmp/out"))"
     exit 0
 fi
-# "c" is another scene, which no program of ours shows.
+# Image c is of another scene, which none of these programs renders right.
 expect "a right program needs nobody" 0 "4.00 of 6" grade right "$tmp/make.rubric" "$tmp/class/right"
 said right right graded null
 points right right 4.0
@@ -147,7 +148,7 @@ tell "a build's log is kept" "$(grep -q 'expected expression' "$tmp/make/not_c/$
 expect "archives" 0 "4.00 of 6" grade cmake "$tmp/cmake.rubric" "$tmp/zipped.zip" "$tmp/packed.tar.gz" "$tmp/inside" "$tmp/class/right"
 for name in zipped packed inside right; do points cmake $name 4.0; done
 
-# Who hands in a program and no sources has built it.
+# Programs handed in without sources are not built.
 cp -R "$tmp/tree" "$tmp/made" && make -sC "$tmp/made" && mkdir "$tmp/built" && cp "$tmp/made"/{tiny,liblevel.so} "$tmp/built"
 (cd "$tmp/built" && zip -q "$tmp/prebuilt.zip" tiny liblevel.so)
 expect "programs" 0 "4.00 of 6" grade programs "$tmp/cmake.rubric" "$tmp/built" "$tmp/prebuilt.zip"

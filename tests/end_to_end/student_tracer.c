@@ -332,15 +332,15 @@ static const struct shape *trace(V o, V d, double *distance)
     return nearest;
 }
 
-/* Cosine of the angle at the surface times what comes along `d` from `distance` away, if nothing is in
- * between. */
+/* The cosine at the surface times the light from `distance` away in direction d, or 0 if something
+ * is in between. */
 static V arriving(V p, V n, V d, double distance, V light)
 {
     double cosine = dot(n, d), room = distance * (1 - 1e-7);
     return cosine > 0 && trace(p, d, &room) == NULL ? times(light, cosine) : vec(0, 0, 0);
 }
 
-/* What lamps send to p, as irradiance. */
+/* Irradiance at p from lamps without extent and, by one sample, from glowing triangles. */
 static V direct(V p, V n)
 {
     V sum = {0, 0, 0};

@@ -1,7 +1,8 @@
 #!/bin/bash
-# tests/end_to_end/threads.sh PATHTRACER [SCENE.dae...]: renders each scene (all of reference/scenes) with 1, 2, 3, 7 and 16
-# threads and compares all sums bit by bit, as --keep-state leaves them in double; the first scene also in its
-# other ways to sample. "ok NAME" or "not ok NAME: why" for each; with PATHTRACER built for it, TSan's reports too.
+# tests/end_to_end/threads.sh PATHTRACER [SCENE.dae...]: renders each scene (all of reference/scenes) with 1, 2, 3, 7
+# and 16 threads and compares all sums bit by bit, as --keep-state leaves them in double; 41_cornell also with other
+# samplers and options. "ok NAME" or "not ok NAME: why" for each; with a PATHTRACER built for it, TSan's reports count,
+# too.
 set -u
 pathtracer=$(realpath "${1:?usage: tests/end_to_end/threads.sh PATHTRACER [SCENE.dae...]}")
 shift
@@ -42,7 +43,7 @@ same_bits "a pilot" --adaptive-unbiased 0.3 --pilot 4 "$first"
 same_bits "layers" --aov "$first"
 same_bits "one path at a time" --isa scalar "$first"
 same_bits "roulette, several light samples" --roulette on -l 3 "$first"
-# The comparison can fail: one bit of the seed is another image.
+# Control: the comparison can fail, as another seed gives other sums.
 render 1 --seed 8 "$first" && cp "$tmp/1.exr.state" "$tmp/other" && render 1 --seed 9 "$first"
 # The seed stands in the head; the last 32 bytes are a hash, the 1000 before them are sums.
 if cmp -s <(tail -c 1032 "$tmp/other" | head -c 1000) <(tail -c 1032 "$tmp/1.exr.state" | head -c 1000); then

@@ -26,7 +26,7 @@ def hit(scene, origin, way):
 
 
 def light(scene, at, normal, rng):
-    """Light that comes from a point of the lamp, over the chance of that point."""
+    """Reflected radiance (albedo 1) from a random point of the lamp, over the point's density."""
     lamp = scene["lamp"]
     to = np.column_stack([lamp["size"] * (rng.random(len(at)) - 0.5), np.full(len(at), lamp["height"]),
                           lamp["size"] * (rng.random(len(at)) - 0.5)]) - at
@@ -38,7 +38,7 @@ def light(scene, at, normal, rng):
 
 
 def around(normal, rng):
-    """A direction with the density of the cosine."""
+    """Cosine-distributed directions around the normals."""
     a, z = 2 * np.pi * rng.random(len(normal)), 2 * rng.random(len(normal)) - 1
     way = normal + np.column_stack([np.sqrt(1 - z * z) * np.cos(a), np.sqrt(1 - z * z) * np.sin(a), z])
     return way / np.sqrt((way * way).sum(1))[:, None]

@@ -14,7 +14,7 @@ tell() { # NAME STATUS
         failures=$((failures + 1))
     fi
 }
-# That a race would be seen.
+# Control: a race is seen.
 cat >"$tmp/race.c" <<'END'
 #include <pthread.h>
 static int n;

@@ -1,6 +1,7 @@
 #!/bin/bash
-# tests/end_to_end/verbs.sh BUILD: verbs, and ways through them, that the other end-to-end runs leave out: references of a live engine, the matrix
-# of a validation, second looks, rubrics that accept deviations and count samples. Prints "ok NAME", "not ok NAME: why" or "skip NAME".
+# tests/end_to_end/verbs.sh BUILD: verbs and options that the other end-to-end runs leave out: references of a live
+# engine, the matrix of a validation, further looks, rubrics that accept deviations and count samples, locks. Prints "ok
+# NAME", "not ok NAME: why" or "skip NAME".
 set -u
 build=$(realpath "${1:?usage: tests/end_to_end/verbs.sh BUILD}")
 pathtracer=$build/pathtracer assay=$build/assay
@@ -12,8 +13,8 @@ what=""
 . tests/end_to_end/expect.sh
 sum() { sha256sum "$1" | cut -d ' ' -f 1; }
 
-# assay reference: what is up to date is not rendered again, the same seed gives the same bits, and a candidate that is older than
-# what is stored goes. In Blender's place our own program writes an image for each seed.
+# assay reference: what is up to date is not rendered again, the same seed gives the same bits, and a candidate older
+# than the stored reference is removed. In place of Blender our own program writes an image for each seed.
 mkdir "$tmp/suite" "$tmp/work" "$tmp/bin"
 cp reference/scenes/13_square_patch.dae "$tmp/suite"
 sed 's/"width": 64, "height": 64/"width": 16, "height": 16/; s/"tile": 16/"tile": 8/; s/"replicates": [0-9]*, "spp": [0-9]*/"replicates": 3, "spp": 4/' \
@@ -56,7 +57,7 @@ expect "reference: what is stored is up to date" 0 "store/13_square_patch/cycles
 right "reference: an older candidate goes" test ! -e "$image"
 expect "validate: no program" 3 "blender: no such program" env PATH=/nowhere "$assay" validate -q --live --only 13_square_patch -o "$tmp/live"
 
-# A validation that looks again where 16 samples do not decide: what was rendered before counts.
+# A validation takes further looks where 16 samples do not decide, adding to what was rendered before.
 expect "validate: looks" 0 "33_sphere_light" "$assay" validate -q --budget 5m --only 33_sphere_light --out "$tmp/report"
 right "validate: one look of 16 samples, another with 64" grep -q '"n_a": 16.0' "$tmp/report/results.json"
 right "validate: and a third with 256" test "$(grep -c '"n_a": \(64\|256\).0' "$tmp/report/results.json")" -gt 1
@@ -99,7 +100,7 @@ check light 6 equal area
   image 0.02 0.08
   tile 0.08 0.3
 END
-# Source trees whose build wraps our program; WORDS changes the words "${a[@]}" of its command, number i at a time.
+# Source trees whose build wraps our program; WORDS, run for each index i, changes the words "${a[@]}" of its command.
 sub() { # NAME WORDS
     mkdir -p "$tmp/subs/$1"
     cp "$pathtracer" "$tmp/subs/$1/tracer"
@@ -141,7 +142,7 @@ kill -9 $pid && wait $pid 2>/dev/null
 expect "after a kill it is free" 0 "EQUIVALENT" "$assay" validate -q -o "$tmp/taken" --only 11_furnace
 right "and no lock stays" test ! -e "$tmp/taken/.assay-lock"
 
-# make waits for who else installs packages, and for nothing else.
+# make waits for other installations of packages to end, and for nothing else.
 mkdir "$tmp/stub"
 printf '#!/bin/sh\nexit 1\n' >"$tmp/stub/dpkg-query"
 printf '#!/bin/sh\nexec "$@"\n' >"$tmp/stub/sudo"

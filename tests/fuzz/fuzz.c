@@ -10,7 +10,7 @@
 
 enum { SUFFIXES = 2 };
 
-/* A file stays open: opening it takes longer than what is done with a small one. */
+/* Files stay open: opening one takes longer than reading it, if it is small. */
 static struct {
     char path[64];
     int f;
@@ -35,7 +35,8 @@ void fuzz_require(int ok, const char *what)
     abort();
 }
 
-/* What is compiled without sanitizers, in the belief that no fuzzer runs it, calls this (tests/tests.mk). */
+/* Called by code that is compiled without sanitizers, as no fuzzer should run it
+ * (tests/tests.mk). */
 void __cyg_profile_func_enter(void *function, void *caller);
 void __cyg_profile_func_exit(void *function, void *caller);
 

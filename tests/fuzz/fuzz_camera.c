@@ -1,4 +1,4 @@
-/* Camera files of the assignment, and that the rays of a camera which was read are rays. */
+/* Camera files of the assignment; a camera that was read has to give valid rays. */
 #include "renderer/scene/camera.h"
 #include "fuzz.h"
 

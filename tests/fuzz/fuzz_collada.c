@@ -1,11 +1,11 @@
-/* COLLADA files, and that a scene which loaded is one that a renderer may trust. */
+/* COLLADA files; a scene that was loaded has to hold all that the renderer relies on. */
 #include "renderer/scene/camera.h"
 #include "renderer/collada/collada.h"
 #include "fuzz.h"
 
 #include <math.h>
 
-/* Images are looked for beside it: those of the suite are there. */
+/* Images are looked for beside this path, where those of the suite are. */
 #define PLACE "reference/scenes/fuzz.dae"
 
 static int finite3(vec3 v)

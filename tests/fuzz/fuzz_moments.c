@@ -1,4 +1,4 @@
-/* EXR files with moments: OpenEXR's C library, and what we make of it. */
+/* EXR files with moments: OpenEXR's C library, and our use of it. */
 #include "renderer/image/moments.h"
 #include "fuzz.h"
 

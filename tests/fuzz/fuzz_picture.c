@@ -1,4 +1,5 @@
-/* Images from elsewhere: whatever `assay compare` or a texture might be given, by way of OpenImageIO; HDR skies by our reader. */
+/* Images from elsewhere, as given to `assay compare` or as textures, read by OpenImageIO; HDR skies
+ * by our own reader. */
 #include "renderer/image/image_oiio.h"
 #include "fuzz.h"
 
@@ -14,7 +15,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         image_free(&im);
     else
         fuzz_check_line(&e, path);
-    /* Targa is told by its name alone. */
+    /* Targa is recognised by the file's name alone. */
     path = fuzz_file(data, size, size % 2 ? ".tga" : ".picture");
     if (image_read_colours(path, &im, &e)) {
         fuzz_require(im.channels == 3 && im.width > 0 && im.height > 0, "colours without shape");

@@ -1,4 +1,4 @@
-/* plan.jsonl: as it is; and its jobs behind a head that is right, so that they are looked at too. */
+/* plan.jsonl as it is, and again behind a valid head line, so that its jobs are read too. */
 #include "renderer/base/version.h"
 #include "tools/jobs/plan.h"
 #include "fuzz.h"

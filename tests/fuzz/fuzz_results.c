@@ -1,4 +1,5 @@
-/* results.json, that whatever was read can be shown, and that a command that can be read can be written and read again. */
+/* results.json: what is accepted can be printed, and a command that can be split can be joined and
+ * split again. */
 #include "renderer/base/shell_quote.h"
 #include "tools/results/results_table.h"
 #include "fuzz.h"

@@ -1,9 +1,8 @@
 #!/bin/bash
-# tests/fuzz/run.sh [-j JOBS] BUILD SECONDS [NAME...]: runs fuzz_NAME (all of them) for that long each. A run starts from the
-# files that the suite and tests/fuzz/seeds have, from tests/fuzz/found/NAME (what was found once, and must not be
-# again) and from what earlier runs learned (BUILD/fuzz/NAME.corpus). SECONDS "fixed" is what a test can ask for: nothing
-# learned earlier, a fixed seed, and a fixed number of executions, some ten seconds, so that it says tomorrow what it says
-# today; searching is for the other runs.
+# tests/fuzz/run.sh [-j JOBS] BUILD SECONDS [NAME...]: runs fuzz_NAME (all of them) for SECONDS each. A run starts from
+# the files of the suite and of tests/fuzz/seeds, from tests/fuzz/found/NAME (inputs that failed once and must not
+# again) and from the corpus of earlier runs (BUILD/fuzz/NAME.corpus). SECONDS "fixed" is for tests, reproducible: no
+# earlier corpus, a fixed seed, and a fixed number of executions, some ten seconds; it does not search.
 # A line for each, "ok fuzz NAME: N executions, M inputs kept, S s" or "not ok fuzz NAME: why"; what breaks is kept as
 # BUILD/fuzz/NAME-*, and the exit code is 1.
 set -u

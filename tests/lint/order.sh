@@ -1,10 +1,11 @@
 #!/bin/bash
-# tests/lint/order.sh BUILD: who may use whom, by the sources here and their objects in BUILD. A file uses only its own folder and those
-# before it, in what it includes and in the symbols that it links; no circle between files; at most 25 C files in a folder;
-# each file name once; public functions begin with a word of their file's or folder's name or of a type's. Planted faults have to be seen first.
+# tests/lint/order.sh BUILD: the order of folders, by the sources here and their objects in BUILD. A file uses only its
+# own folder and those before it, in what it includes and in the symbols that it links; no cycle between files; at most
+# 25 C files in a folder; no file name twice; public functions begin with a word of their file's or folder's name or of
+# a type's. Planted faults have to be found first.
 set -euo pipefail
 build=$(realpath "${1:?usage: tests/lint/order.sh BUILD}")
-# In their order, from the first column of the READMEs' tables.
+# The folders in their order, from the first column of the READMEs' tables.
 folders=$(for top in renderer reference tools; do
     sed -nE 's/^\| (`[^|]*`) \|.*/\1/p' $top/README.md | tr -d '`,' | tr ' ' '\n' | sed "s,^,$top/,"
 done)
@@ -20,14 +21,14 @@ symbols() {
         sed -E 's,(_(sse42|avx2|avx512|scalar))?\.c\.o: ,.c ,'
 }
 
-# "FROM TO" of such symbols.
+# "FROM TO" for each file that needs another's symbol, from symbols() on stdin.
 links() {
     awk '$3 == "U" { users[$2] = users[$2] " " $1 } $3 ~ /[A-T]/ { home[$2] = $1 }
          END { for (s in users) if (s in home) { n = split(users[s], f); for (i = 1; i <= n; i++) if (f[i] != home[s]) print f[i], home[s] } }' |
         sort -u
 }
 
-# against_order VERB: pairs on stdin that are against the order.
+# against_order VERB: prints the pairs "FROM TO" on stdin that violate the order, as "FROM VERB TO".
 against_order() {
     awk -v verb="$1" -v folders="$folders" 'function folder(file) { sub("/[^/]*$", "", file); return file }
         BEGIN { n = split(folders, list); for (i = 1; i <= n; i++) rank[list[i]] = i }

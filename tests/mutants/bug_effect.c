@@ -36,7 +36,7 @@ bool bug_list(const char *dir, struct catalogue *c, struct err *e)
     return ok && (c->num_bugs > 0 || err_set(e, "%s: no patch", dir));
 }
 
-/* How the differences scatter, over what independent renders would. */
+/* Variance of the differences over the batches, relative to that of independent renders. */
 static double level_of(const struct signature *bug, const struct signature *correct, int batches,
                        const struct signature *a, const struct signature *c)
 {

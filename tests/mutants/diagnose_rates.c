@@ -1,12 +1,12 @@
 /* diagnose_rates BUILD [PART]: how often `assay diagnose` is right, as a Markdown page on standard output (make
- * diagnose-rates). Renders of all bugs and of the correct renderer with seeds, and but for the first time at sizes and
- * numbers of samples, that the catalogue was not made with; the correct renderer also in TRIES synthetic looks.
+ * diagnose-rates). Renders all bugs and the correct renderer with other seeds than the catalogue's and, but for part
+ * "same", at other sizes and numbers of samples; the correct renderer also in TRIES synthetic looks.
  *
  * A synthetic look: each cell of each view is that of a real correct render drawn from POOL, moved so that the pool's
- * mean is the catalogue's mean plus a normal error of the catalogue's own variance, and scaled by
- * sqrt(POOL/(POOL - 1)), which the pool's own mean takes from its scatter. Where a view asks for consistency, its
- * renders are drawn from POOL real ones without replacement, and judged; each such draw serves for
- * TRIES / CONSISTENT_DRAWS tries. PART (same, large, small, few, correct) measures only that. */
+ * mean is the catalogue's mean plus a normal error of the catalogue's own variance; its scatter is scaled by
+ * sqrt(POOL/(POOL - 1)), as the pool's own mean was subtracted. Where a view asks for consistency, its renders are
+ * drawn from POOL real ones without replacement, and judged; each such draw serves for TRIES / CONSISTENT_DRAWS
+ * tries. PART (same, large, small, few, correct) measures only that part. */
 #include "renderer/base/fs.h"
 #include "tools/diagnose/diagnose.h"
 #include "tools/diagnose/diagnose_render.h"
@@ -30,7 +30,7 @@ struct rate_image {
     struct catalogue c;
 };
 
-/* What one renderer looks like: size times `scale_percent`, samples times spp_percent. */
+/* How a renderer is looked at: width and height, and samples, in per cent of the catalogue's. */
 struct look {
     const char *program;
     int scale_percent, spp_percent;
@@ -204,7 +204,7 @@ static double normal(uint64_t *state)
     return sqrt(-2 * log(uniform(state))) * cos(6.283185307179586 * uniform(state));
 }
 
-/* Means of the pool, per view. */
+/* POOL real renders of the correct renderer, and their means per view. */
 struct pool {
     const struct claim_run *task;
     double (*mean)[SIGNATURE_VALUES];
@@ -212,8 +212,9 @@ struct pool {
     int consistent_view;    /* -1: none */
 };
 
-/* All samples have one value. A rare event in one render of the pool moves the pool's mean, and with it the others away
- * from the value that they have: such a cell stays as it was rendered. */
+/* Do all samples of a cell have one value? Such a cell stays as it was rendered: a rare event in
+ * one render of the pool would move the pool's mean, and with it all other renders off that
+ * value. */
 static bool is_still(const struct signature *s, int value)
 {
     return sqrt(s->var[value]) <= 1e-5 * s->mean[value];

@@ -1,14 +1,14 @@
-/* make_catalogue BUILD PATCHES CATALOGUE: brings the catalogue of known bugs (tools/diagnose/catalogue.h) up to date. Every bug of
- * PATCHES has been built as BUILD/mutants/NAME/pathtracer (tests/mutants/mutants.sh --build-only), the correct
- * renderer is BUILD/pathtracer.
+/* make_catalogue BUILD PATCHES CATALOGUE: brings the catalogue of known bugs (tools/diagnose/catalogue.h) up to date.
+ * Every bug of PATCHES has to be built as BUILD/mutants/NAME/pathtracer (tests/mutants/mutants.sh --build-only); the
+ * correct renderer is BUILD/pathtracer.
  *
  * For each view: BATCHES batches of renders by the correct renderer, and by each bug with the same seeds,
  * so that what a bug does not touch has no noise in the difference. The effect is the mean over batches of
  * bug minus correct. Its variance per cell is lambda (var bug + var correct), as of independent renders,
  * with lambda from the scatter of the differences over the batches. A bug whose first batch is bit for bit the
- * correct one has no effect; an effect that is within its noise (chi^2 below its mean by less than 6 standard
- * deviations) is stored as none, for it would only add noise. The correct mean has LONG further renders of
- * LONG_FACTOR times the samples.
+ * correct one has no effect; an effect within its noise (chi^2 less than 6 standard deviations above its mean)
+ * is stored as none, as it would only add noise. The correct mean has LONG further renders of LONG_FACTOR
+ * times the samples.
  *
  * What is there and up to date (the scene's and the patch's hash, the view's settings) is kept. */
 #include "renderer/base/fs.h"
@@ -24,8 +24,8 @@
 
 enum { BATCHES = 2, LONG = 4, LONG_FACTOR = 8, SEED = 20260, LONG_SEED = 30260 };
 
-/* The fewest and cheapest looks that tell the bugs apart; spp and renders are those of a diagnosis, which
- * takes as long as this list. */
+/* Few and cheap views that tell the bugs apart; spp and renders are those of a diagnosis, whose
+ * time they decide. */
 static const struct {
     const char *scene, *variant, *options, *name; /* name: what is added to the scene's */
     int width, height, columns, spp, renders;
@@ -117,7 +117,8 @@ static bool same_values(const struct signature *a, const struct signature *b)
            memcmp(a->var, b->var, sizeof a->var) == 0 && a->n == b->n;
 }
 
-/* `times` images of as many samples as a batch, with this average. */
+/* Splits a long render into `times` images of a batch's samples, with the same average; returns
+ * times. */
 static int repeat(const struct signature *s, int times, struct signature *all)
 {
     for (int i = 0; i < times; i++) {
@@ -139,7 +140,8 @@ static bool make_batches(struct base *base, const char *program, struct err *e)
     return true;
 }
 
-/* A mean that depends on the number of samples asked for needs more renders instead of longer ones. */
+/* Where the mean depends on the samples asked for (fixed_spp), more renders are made instead of
+ * longer ones. */
 static bool make_correct(struct base *base, const char *program, struct view *v, struct err *e)
 {
     struct signature all[BATCHES + LONG_FACTOR * LONG], s;

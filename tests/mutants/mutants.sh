@@ -56,14 +56,14 @@ build_mutant() {
     for file in "${files[@]}"; do
         patch --quiet --fuzz=0 --no-backup-if-mismatch -p1 -d "$dir" <"$file" || return 1
     done
-    # A header changes all that includes it: make's dependency files know.
+    # A changed header means all files that include it, by make's dependency files.
     for file in $(sed -n 's,^+++ b/,,p' "${files[@]}" | sort -u); do
         case $file in
         *.h) changed+=" $(cd "$build" && grep -rl "$file" renderer --include=*.c.d | sed 's,\.d$,,')" ;;
         *) changed+=" $file" ;;
         esac
     done
-    # A kernel is as many objects as there are instruction sets, of which one runs.
+    # A kernel has an object for each instruction set, of which only this machine's is built.
     changed=$(for file in $changed; do
         awk -v file="$file" -v isa="_$isa.c" '$1 == file || $2 == file { found = 1; if (index($1, isa)) print $1 } END { if (!found) print file }' <<<"$kernels"
     done | sort -u)
@@ -85,8 +85,8 @@ build_mutant() {
     chmod +x "$dir/pathtracer"
 }
 
-# The first claim that differs where it should not, "scene|against|why", from the results. They are
-# written a member a line, "scene" first and "reason" after "verdict".
+# The first claim that differs where it should not, as "scene|against|why", from results.json, which has
+# one member on a line, "scene" first and "reason" after "verdict".
 find_claim() {
     awk '
         function text() { sub(/^[^:]*: "/, ""); sub(/",?$/, ""); gsub(/[|]/, "/"); return $0 }

@@ -1,5 +1,5 @@
-/* What is below a program's own malloc() and kin: AddressSanitizer's if it is there, so that it sees every block as ever, else the C
- * library's. MALLOC_BELOW(malloc)(size), say. */
+/* The allocator beneath a program's own malloc(), free(), ...: AddressSanitizer's if linked, so
+ * that it still sees every block, else the C library's. For example MALLOC_BELOW(malloc)(size). */
 #ifndef ASSAY_TESTS_MALLOC_BELOW_H
 #define ASSAY_TESTS_MALLOC_BELOW_H
 

@@ -25,7 +25,7 @@ struct mesh_bounds {
 };
 struct mesh_bounds mesh_bounds(const struct scene *s);
 
-/* In [-1,1]^3, number (i, k) of that seed. */
+/* Random point number (i, k) of that seed, in [-1,1]^3. */
 vec3 mesh_random_point(uint64_t seed, uint32_t i, uint32_t k);
 
 #endif

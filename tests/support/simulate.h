@@ -51,7 +51,7 @@ static inline double draw(enum law law, uint64_t *state)
     abort();
 }
 
-/* Central sums of n draws times `scale` by shifted power sums. */
+/* Mean and central sums of n draws times `scale`, by shifted power sums. */
 static inline void draw_pixel(enum law law, double scale, int n, uint64_t *state, double *mean,
                               double *m2, double *m3)
 {
@@ -78,7 +78,7 @@ static inline struct moments new_moments(int width, int height, const char *unit
     return m;
 }
 
-/* All pixels of mean `scale`. grey: the three channels are one and the same; else independent. */
+/* Fills all pixels, with mean `scale`. is_grey: the three channels are equal; else independent. */
 static inline void simulate(struct moments *m, enum law law, double scale, int n, bool is_grey,
                             uint64_t *state)
 {

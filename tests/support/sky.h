@@ -1,5 +1,5 @@
-/* Sky maps made in C, and what their radiance is, by another route than the renderer's: a sum of
- * tent functions on the grid of texels. */
+/* Sky maps made in C, and their radiance by another method than the renderer's: a sum of tent
+ * functions on the grid of texels. */
 #ifndef ASSAY_TEST_SKY_H
 #define ASSAY_TEST_SKY_H
 
@@ -11,7 +11,7 @@ struct sky {
     float value[64 * 32];
 };
 
-/* Values between 0.25 and 2.25 without any order, a black corner and one texel of 60. */
+/* Pseudorandom values between 0.25 and 2.25, a black corner, and one texel of 60. */
 struct sky sky_uneven(int width, int height);
 
 /* The image; the caller frees it with image_free(). Fails the test on any trouble. */

@@ -56,7 +56,7 @@ void suite_knot(double s, double t, double p[3], double n[3])
     unit3(n);
 }
 
-/* A number with so many digits behind the point, without zeros that tell nothing. */
+/* Prints x with at most `digits` decimals, without trailing zeros and the zero before the point. */
 static void number(FILE *f, double x, int digits)
 {
     char text[32];
@@ -76,7 +76,8 @@ static void number(FILE *f, double x, int digits)
     fprintf(f, "%s%s", sign, rest);
 }
 
-/* Numbers of so many digits for each vertex: `which` is 0 for its position, 1 for its normal. */
+/* Prints three numbers for each vertex, with at most `digits` decimals: its position (which 0) or
+ * normal (1). */
 static void knot_vertices(FILE *f, int digits, int which)
 {
     for (int i = 0; i < KNOT_ALONG * KNOT_AROUND; i++) {
@@ -119,9 +120,9 @@ void suite_write_mesh(FILE *f)
     fclose(around);
 }
 
-/* Horizon bright, both poles the same blue, so that a reader which joins the top row to the bottom row
- * finds what one that does not finds; below the horizon darker. The lobe of the sun ends 45 degrees
- * from its middle, short of the pole. */
+/* Bright at the horizon, darker below, the same blue at both poles, so that it makes no difference
+ * whether a reader joins the top row to the bottom row. The lobe of the sun ends 45 degrees from
+ * its middle, short of the pole. */
 void suite_sky_radiance(const double d[3], double radiance[3])
 {
     static const double horizon[3] = {0.6, 0.57, 0.51}, pole[3] = {0.18, 0.3, 0.54};

@@ -1,6 +1,6 @@
-/* The suite that is shipped, and the files of it that no hand can write: the mesh of 44_mesh and the sky images of
- * 46_sky and 96_sky_turned. make_suite_files writes them; test_suite_scenes holds the shipped files
- * against these functions. */
+/* The suite that is shipped, and those of its files that are computed: the mesh of 44_mesh and the
+ * sky images of 46_sky and 96_sky_turned. make_suite_files writes them; test_suite_scenes compares
+ * the shipped files with these functions. */
 #ifndef ASSAY_TEST_SUITE_FILES_H
 #define ASSAY_TEST_SUITE_FILES_H
 
@@ -9,7 +9,7 @@
 
 #include <stdio.h>
 
-/* reference/scenes, read once, and a scene of it. What is missing fails the test. */
+/* reference/scenes, read once, and a scene of it; the test fails if it is missing. */
 const struct suite *suite_shipped(void);
 const struct suite_scene *suite_shipped_scene(const char *name);
 

@@ -1,7 +1,7 @@
-/* Many synthetic images of one law, cheaply: pixels are put together from a library of blocks of n
- * draws, picked at random with replacement, while every image renews some of the blocks. Two images
- * of one library are exchangeable, so equal means hold between them exactly, and against the library's
- * mean; the law's own mean it has only up to 1/sqrt(blocks) of a block's standard deviation. */
+/* Many synthetic images of one law, cheaply: pixels are composed from a library of blocks of n
+ * draws, picked at random with replacement; library_renew() replaces blocks. Two images of one
+ * library are exchangeable, so their expected means are exactly equal, and equal to library_mean();
+ * that differs from the law's mean by about 1/sqrt(blocks) of a block's standard deviation. */
 #ifndef ASSAY_TESTS_SYNTHETIC_IMAGES_H
 #define ASSAY_TESTS_SYNTHETIC_IMAGES_H
 
@@ -29,9 +29,9 @@ void library_free(struct library *l);
 void library_renew(struct library *l, size_t num);
 /* What every pixel's mean is expected to be, given the library. */
 double library_mean(const struct library *l);
-/* Every pixel of `merge` blocks, so n = merge * l->n; the channels are one and the same (grey) or
- * independent. No pixel has the very numbers of `other`'s, unless it has no noise: that would be a
- * seed used twice. NULL: no such image. */
+/* Fills *m with pixels of `merge` blocks each, so n = merge * l->n; the channels are equal
+ * (is_grey) or independent. No pixel has the very values of `other`'s, unless it has no noise: that
+ * would be a seed used twice. other NULL: no such image. */
 void library_image(struct library *l, int merge, bool is_grey, const struct moments *other,
                    struct moments *m);
 

@@ -23,7 +23,7 @@ void test_add(const char *name, CMUnitTestFunction run, CMFixtureFunction set_up
 void test_add_group(CMFixtureFunction set_up, CMFixtureFunction tear_down);
 
 #define TEST(name) TEST_WITH(name, NULL, NULL)
-/* What set_up leaves in *state is the test's, and tear_down frees it. */
+/* set_up leaves in *state what the test gets, and tear_down frees it. */
 #define TEST_WITH(name, set_up, tear_down)                                                         \
     static void name(void **state);                                                                \
     static __attribute__((constructor)) void name##_add(void)                                      \
@@ -39,7 +39,7 @@ void test_add_group(CMFixtureFunction set_up, CMFixtureFunction tear_down);
         name##_of(*state);                                                                         \
     }                                                                                              \
     static void name##_of(struct fixture *f)
-/* Once before all tests of the file, and once after them. */
+/* set_up runs once before all tests of the file, tear_down once after them. */
 #define TEST_GROUP(set_up, tear_down)                                                              \
     static __attribute__((constructor)) void group_add(void)                                       \
     {                                                                                              \
@@ -51,7 +51,8 @@ void test_add_group(CMFixtureFunction set_up, CMFixtureFunction tear_down);
 /* "DIR/name" in a directory of this program's own, which is made when it is first asked for and removed with all that is
  * in it after the tests. One of 16 buffers, which take turns. */
 const char *test_path(const char *name);
-/* The whole file with a 0 behind it; the caller frees. And writes a file. */
+/* Returns the whole file with a 0 behind it, which the caller frees. Writes a file. Both fail the
+ * test on errors. */
 char *test_read(const char *path);
 void test_write(const char *path, const void *bytes, size_t size);
 /* Writes a text; one of JSON may have ' for ", which makes it legible in C. */
@@ -60,12 +61,12 @@ void test_write_json(const char *path, const char *json);
 /* The text with " for each '; the caller frees. */
 char *test_json(const char *text);
 
-/* Path of one of the assignment's files, which are not ours to ship (ASSAY_CS184 says where they are); else it skips the test, and
- * says so. */
+/* Path of one of the assignment's files, which are not ours to ship (ASSAY_CS184 says where they
+ * are); skips the test, and says so, if it is not there. A static buffer. */
 const char *test_course_file(const char *name);
 
-/* Fails at the first line of the text that is not the one of the file `expected`. Numbers are the same that differ by
- * 1e-6 of the expected one. A line of the file that begins with "; " is a remark, and is left out. */
+/* Fails at the first line of the text that differs from that of the file `expected`. Numbers may
+ * differ by 1e-6 of the expected one. Lines of the file that begin with "; " are comments. */
 void test_same_text(const char *text, const char *expected);
 
 /* text: what these calls write to the stream `f`; the caller frees. */
@@ -86,7 +87,7 @@ void test_same_text(const char *text, const char *expected);
             fail_msg("%s is %.15g, expected %.15g", #a, a_, b_);                                   \
     } while (0)
 
-/* What must not fail for the test to mean anything: else it fails with the line in `e`. */
+/* A call that the test relies on: if it fails, so does the test, with the line in `e`. */
 #define MUST(call)                                                                                 \
     do {                                                                                           \
         if (!(call))                                                                               \

@@ -1,4 +1,4 @@
-/* Vectors of double for second routes. */
+/* Vectors of double, for computations independent of the renderer's. */
 #ifndef ASSAY_TEST_VECTORS_H
 #define ASSAY_TEST_VECTORS_H
 

@@ -1,7 +1,8 @@
 #!/bin/bash
-# tools/autograder/pack.sh BUILD RUBRIC OUT.zip COMMIT PACKAGE...: an autograder for Gradescope. The zip holds setup.sh and
-# run_autograder, our sources (built where they run: the libraries differ), the files beside the rubric, its catalogue of bugs,
-# its references, which are rendered here, once, and the starter code $SKELETON, if that is set, to fill the compiler cache from.
+# tools/autograder/pack.sh BUILD RUBRIC OUT.zip COMMIT PACKAGE...: makes an autograder for Gradescope. The zip holds
+# setup.sh and run_autograder, our sources (built on Gradescope, as libraries differ), the files beside the rubric, its
+# catalogue of bugs, its references, which are rendered here, once, and, if $SKELETON is set, that starter code, to fill
+# the compiler cache.
 set -eu
 build=$(realpath "$1") rubric=$2 out=$3 commit=$4
 shift 4

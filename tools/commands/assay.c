@@ -45,8 +45,8 @@ static void print_help(void)
          "or nothing found without a margin, 3 could not judge, with one line on stderr.");
 }
 
-/* For jansson, whose calls add to documents in hundreds of places: a result that silently lacks a part would be worse
- * than none, so without memory for it the program ends here, before anything is written. */
+/* The allocator of jansson, which is called in hundreds of places: a result that silently lacks a part would be
+ * worse than none, so the program ends here if memory runs out, before the result is written. */
 static void *json_memory(size_t size)
 {
     void *p = malloc(size);

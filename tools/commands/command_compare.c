@@ -126,14 +126,14 @@ static bool check(struct settings *s, struct err *e)
     return true;
 }
 
-/* Up to two digits, so that what is printed still holds. */
+/* Rounds up to two digits, so that the printed bound still holds. */
 static double round_up(double x)
 {
     double unit = pow(10, floor(log10(x)) - 1);
     return ceil(x / unit) * unit;
 }
 
-/* Which of two is noisier, where both sides say how noisy they are. */
+/* Prints the ratio of the variances, if both sides state their noise. */
 static void print_noise(const struct variance_ratio *v)
 {
     if (v->valid)

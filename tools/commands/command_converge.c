@@ -35,7 +35,7 @@ static bool read_ladder(void *options, const char *const v[4], struct err *e)
     return o->num_rungs >= 3 || err_set(e, "--ladder: at least three rungs");
 }
 
-/* The first replaces the default. */
+/* The first --engine replaces the default engines, later ones are added. */
 static bool read_engine(void *options, const char *const v[4], struct err *e)
 {
     struct converge_options *o = options;
@@ -101,7 +101,7 @@ static bool write_all(const json_t *results, const char *out_dir, struct err *e)
     return true;
 }
 
-/* The one line on stderr that exit code 3 owes. */
+/* The line on stderr that goes with exit code 3. */
 static void tell_not_judged(void *ctx, const struct convergence_row *r)
 {
     struct err *e = ctx;

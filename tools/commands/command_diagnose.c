@@ -80,7 +80,7 @@ static bool gather(const struct settings *s, const struct diagnose_gather_option
     return diagnose_gather_image(g, s->view, s->input, clue, e);
 }
 
-/* Where nothing has a name. */
+/* Says where to look if no known bug explains the difference. */
 static bool tell_place(const struct settings *s, struct err *e)
 {
     if (s->input == NULL) {

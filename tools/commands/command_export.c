@@ -1,4 +1,4 @@
-/* A scene written for another renderer. */
+/* assay export: writes a scene for another renderer. */
 #include "reference/base/json_file.h"
 #include "reference/base/json_node.h"
 #include "reference/external/engine_bindings.h"
@@ -11,7 +11,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* Texts are those of the command line. */
+/* Texts point into the command line. */
 struct settings {
     const char *scene;
     const char *environment; /* NULL: none */
@@ -65,8 +65,8 @@ static bool choose_engine(struct settings *s, struct err *e)
                    s->out);
 }
 
-/* A scene of a suite whose description (its .json) names an environment that was not given is exported without, and so is one
- * without any light. */
+/* Warns if the scene's .json names an environment that was not given, or if the scene has no light at all. It is
+ * exported all the same. */
 static void warn_of_missing_light(const struct settings *s, const struct scene *scene)
 {
     const char *ending = strrchr(s->scene, '.');

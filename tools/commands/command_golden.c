@@ -1,4 +1,4 @@
-/* assay golden render | status | approve: from rendering a reference to storing it. */
+/* assay golden render | status | compare | approve: from rendering a reference to storing it. */
 #include "reference/suite/suite_own.h"
 #include "renderer/base/cli.h"
 #include "renderer/base/fs.h"
@@ -46,7 +46,7 @@ static const struct cli_option options[] = {
          "       assay golden approve [options] [--all] [SCENE | SCENE/ENGINE | SCENE/noise] ...\n"},
     {.noun = "names", CLI_TO_LIST(struct settings, names, num_names)}};
 
-/* A reference of the suite that an engine renders, counted over scenes and engines; NULL past the last. */
+/* Reference i of those of the suite that an engine renders, over all scenes, and its scene; NULL past the last. */
 static const struct suite_reference *rendered_reference(const struct suite *suite, int i,
                                                         const struct suite_scene **scene)
 {
@@ -60,7 +60,7 @@ static const struct suite_reference *rendered_reference(const struct suite *suit
     return NULL;
 }
 
-/* "SCENE" or "SCENE/WHAT": an engine, or "noise". */
+/* Is the name "SCENE" or "SCENE/WHAT", WHAT being an engine or "noise"? */
 static bool is_named(const char *name, const struct suite_scene *scene, const char *what)
 {
     size_t n = strlen(scene->name);
@@ -76,7 +76,7 @@ static bool is_selected(const struct settings *s, const struct suite_scene *scen
     return s->num_names == 0;
 }
 
-/* Every name has to be that of a reference. */
+/* Checks that every name is that of a reference or of a scene's noise. */
 static bool check_names(const struct settings *s, const struct suite *suite, struct err *e)
 {
     if (!s->all && s->num_names == 0)
@@ -106,7 +106,7 @@ static bool is_current(const struct settings *s, const struct suite_scene *scene
     return current;
 }
 
-/* What the suite no longer has is not for approval; *num: how many there are, `first`: one of them. */
+/* Prints the stored references that the suite does not have; *num: how many, *first: one of them. */
 static bool print_orphans(const char *dir, const struct suite *suite, size_t *num,
                           struct path *first, struct err *e)
 {
@@ -163,7 +163,7 @@ static void print_command(const struct settings *s, const struct suite_scene *sc
         s->suite_dir, s->opt.from_dir, s->opt.golden_dir, scene->name, ref->engine);
 }
 
-/* All that are selected, whatever becomes of the others; the line for exit code 3 is that of the first
+/* Decides on all selected references, even if some are refused; the line for exit code 3 is that of the first
  * that could not be judged. */
 static int approve_all(const struct settings *s, const struct suite *suite, struct err *e)
 {
@@ -213,7 +213,7 @@ static int approve_all(const struct settings *s, const struct suite *suite, stru
                                              : EXIT_EQUIVALENT;
 }
 
-/* What an engine's new version changed: a table of all that have a candidate. */
+/* Prints a table of all selected candidates against what is stored: what a new version of an engine changed. */
 static int compare_all(const struct settings *s, const struct suite *suite, struct err *e)
 {
     const struct suite_scene *scene;

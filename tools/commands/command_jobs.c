@@ -1,4 +1,4 @@
-/* plan, run-job, gather and slurm: work in jobs (plan.h). */
+/* assay plan, run-job, gather and slurm: a command cut into jobs (plan.h). */
 #include "renderer/base/cli.h"
 #include "renderer/base/fs.h"
 #include "tools/jobs/plan.h"
@@ -74,7 +74,7 @@ int command_plan(int argc, char **argv, struct err *e)
     return 0;
 }
 
-/* True with the plan read and entered; false with *code and a line, or after --help. */
+/* Reads the plan and changes to its cwd. False: *code is the exit code, after --help or with a line. */
 static bool open_plan(int argc, char **argv, const char *help, struct plan *p, int *code,
                       struct err *e)
 {
@@ -113,7 +113,7 @@ int command_run_job(int argc, char **argv, struct err *e)
     }
     if (argc < 3)
         failed = !err_set(e, "run-job needs the number of a job (see --help)");
-    /* One that fails does not keep the others from being made. */
+    /* The jobs after one that fails are still run. */
     for (int i = 2; i < argc && e->msg[0] == '\0'; i++) {
         struct err why = {""};
         bool made;
@@ -164,7 +164,7 @@ int command_slurm_run(const char *dir, int argc, char **argv, const struct plan_
     bool ok = slurm_make(&p, e);
     if (ok)
         code = plan_gather(&p, e);
-    /* What has been put together needs no plan of ours; one that the user named is the user's. */
+    /* Once all is gathered, a plan directory of our own is removed; one that the user named is kept. */
     if (ok && dir == NULL && e->msg[0] == '\0' && !fs_remove_tree(p.dir, &ignored))
         fprintf(stderr, "assay: note: %s\n", ignored.msg);
     plan_free(&p);

@@ -1,4 +1,4 @@
-/* assay merge: adds renders of successive sample ranges. */
+/* assay merge: merges renders of sample ranges or of cells of one image. */
 #include "renderer/base/cli.h"
 #include "renderer/base/shell_quote.h"
 #include "tools/jobs/merge.h"
@@ -14,7 +14,7 @@ struct settings {
     bool help;
 };
 
-/* The first is the output. */
+/* The first word is the output, the others are shares. */
 static bool read_word(void *settings, const char *const v[4], struct err *e)
 {
     struct settings *s = settings;

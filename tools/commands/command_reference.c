@@ -35,7 +35,7 @@ static bool make_one(void *ctx, const struct suite_scene *scene, const struct su
     return ok;
 }
 
-/* --images wants one reference. */
+/* The single reference of --images. */
 struct chosen {
     const struct suite_scene *scene;
     const struct suite_reference *ref;
@@ -69,7 +69,7 @@ static bool make_noise(const struct reference_command *c, struct err *e)
     return ok;
 }
 
-/* Of a suite of one's own: whoever gives the file wants it rendered now. */
+/* Renders a reference of a suite of one's own with the engine of --engine FILE, even if it is up to date. */
 static bool make_described(void *ctx, const struct suite_scene *scene,
                            const struct suite_reference *ref, struct err *e)
 {
@@ -95,7 +95,7 @@ static bool make_described(void *ctx, const struct suite_scene *scene,
     json_object_set_new(manifest, "engine", json_string(ref->engine));
     json_object_set_new(manifest, "seed", json_integer(opt.seed));
     json_object_set_new(manifest, "subgrid", json_integer(0));
-    /* What else decides the bits is in the manifest. */
+    /* All else that decides the bits is in the manifest already. */
     char key[65];
     sha256_text(fs_path("%s %s %u", member_text(manifest, "description_sha256"),
                         member_text(manifest, "binary_sha256"), opt.seed)

@@ -70,7 +70,7 @@ static bool print_github(const json_t *results, struct err *e)
     return (f != NULL && fclose(f) == 0) || err_set(e, "%s: cannot be written", summary);
 }
 
-/* Family-wise, over all claims of the page. */
+/* Family-wise error rate over all series of the page (history.h). */
 static const double history_alpha = 1e-3;
 
 static int write_history(const char *dir, const char *out, struct err *e)
@@ -93,8 +93,8 @@ static int write_history(const char *dir, const char *out, struct err *e)
     return code;
 }
 
-/* What is asked for of one file, on the terminal; after the page, what `assay validate` says at its end, and of convergence alone
- * only where the page is. */
+/* Prints for one file what was asked for; after writing the page, the last lines of `assay validate`, or, if there
+ * are no claims, only where the page is. */
 static bool print_one(const struct settings *s, const char *path, struct err *e)
 {
     json_t *results;

@@ -22,8 +22,8 @@ int command_run_job(int argc, char **argv, struct err *e);
 int command_gather(int argc, char **argv, struct err *e);
 int command_slurm(int argc, char **argv, struct err *e);
 
-/* What `assay slurm` does with a command, "grade ..." say: plans it below dir (NULL: OUTPUT.plan, which goes in the end), makes its
- * jobs on the cluster, gathers. w NULL: no wishes. */
+/* What `assay slurm` does with a command such as "grade ...": plans it in dir (NULL: OUTPUT.plan, removed in the
+ * end), runs its jobs on the cluster, and gathers. w NULL: no wishes. */
 struct plan_wishes;
 int command_slurm_run(const char *dir, int argc, char **argv, const struct plan_wishes *w,
                       struct err *e);

@@ -16,7 +16,7 @@ const char *const converge_engine_names[] = {
     ENGINES_WITH_GOLDENS(ENGINE_WORD) NULL,
 };
 
-/* Another number for each (engine, rung, replicate); OWN is one more engine. */
+/* Each (engine, rung, replicate) gets a seed of its own; OWN counts as one more engine. */
 enum { OWN = CONVERGE_NUM_ENGINES };
 
 static uint32_t seed_of(const struct converge_job *job, int engine, int rung, int k)

@@ -7,8 +7,8 @@
 #include "renderer/base/progress.h"
 
 /* pathtracer: independent samples, the only engine whose slope must be -1/2. pathtracer-sobol: our
- * stratified sampler. The others are stratified within a replicate or, with a subgrid (engine_table.h), k x k pixels
- * on a regular grid with shared directions, k^2 standing for samples per pixel. */
+ * stratified sampler. The others are stratified within a replicate or, with a subgrid (engine_table.h), render k x k
+ * points of a pixel on a regular grid with shared directions; k^2 then counts as samples per pixel. */
 enum converge_engine {
     CONVERGE_PATHTRACER,
     CONVERGE_SOBOL,
@@ -22,7 +22,7 @@ enum { CONVERGE_MAX_REPLICATES = 4096, CONVERGE_MAX_RUNGS = 16 };
 struct converge_job {
     const struct suite_scene *scene; /* width and height are those of the images to render */
     const char *pathtracer;          /* the program */
-    const char *dir;                 /* exists; for temporary files */
+    const char *dir;                 /* for temporary files; exists */
     const char *share_dir;           /* where cycles.py is */
     uint32_t seed;
     int threads;
@@ -30,13 +30,13 @@ struct converge_job {
     int replicates;
 };
 
-/* Told of every image of our own; the other engines give theirs all at once. */
+/* Progress, updated after every image of ours; the other engines deliver all images at once. */
 struct converge_progress {
     struct progress *progress;
-    double before, each, total; /* work done before this rung, of one image, in all */
+    double before, each, total; /* work: before this rung, of one image, of the whole ladder */
 };
 
-/* In the line of an engine whose answer has no noise. */
+/* Part of the error line about an engine whose images have no noise. */
 #define CONVERGE_NO_NOISE "no noise at all"
 
 /* Fills images (replicates x width x height x 3 floats, one replicate after the other) with images

@@ -18,7 +18,7 @@
 const char *const converge_against_names[] = {"auto", "truth",
                                               ENGINES_WITH_GOLDENS(ENGINE_WORD) "own", NULL};
 
-/* The reference of our own has so many times the samples of the longest ladder. */
+/* Our own reference has this many times the samples of the top rung. */
 enum { OWN_FACTOR = 64 };
 
 /* One engine's ladder on one scene. */
@@ -56,7 +56,7 @@ static enum converge_against choose_reference(const struct suite_scene *s)
     return AGAINST_OWN;
 }
 
-/* The reference of scene s (whose references those of `from` are), and its name. */
+/* Loads or renders the reference of scene s, which uses the references of `from`, and names it. */
 static bool load_reference(const struct run *r, const struct suite_scene *s,
                            const struct suite_scene *from, const struct converge_job *job,
                            struct converge_reference *out, char name[64], struct err *e)
@@ -104,7 +104,7 @@ static void climb(const struct run *r, const struct converge_job *job, int engin
     struct progress progress;
     snprintf(what, sizeof what, "%s, %s", job->scene->name, converge_engine_names[engine]);
     progress_start(&progress, what, NULL, o->quiet);
-    /* An image costs its samples and a start, of which this is a guess good enough for a bar. */
+    /* An image costs its samples and a start; this guess of the start is good enough for a progress bar. */
     const double start = o->ladder[o->num_rungs - 1] / 4.0;
     double done = 0, total = 0;
     for (int i = 0; i < o->num_rungs; i++)
@@ -130,7 +130,7 @@ static void climb(const struct run *r, const struct converge_job *job, int engin
         out->cost = convergence_rate_cost(out->rung, o->num_rungs);
 }
 
-/* exp of an interval of a logarithm, to a power; null where it says nothing (a factor of e^20). */
+/* Interval of exp(x)^power; null if it spans a factor of e^20 or more. */
 static json_t *exp_pair(struct estimate x, double alpha, double power)
 {
     struct interval i = estimate_interval(x, alpha);
@@ -149,7 +149,7 @@ static json_t *rung_json(const struct rung *g, const struct cost *c, double alph
                      exp_pair(eff, alpha, 1));
 }
 
-/* The judgements of one engine, in words and as one verdict, the worst of them. */
+/* The judgements of one engine: each, the worst of them as the verdict, and a reason. */
 static json_t *verdict_json(const struct run *r, int engine, const struct ladder *l)
 {
     const struct converge_options *o = r->opt;

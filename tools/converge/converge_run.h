@@ -6,9 +6,9 @@
 
 enum { CONVERGE_MAX_SCENES = 64 };
 
-/* What the squared error is measured against. AUTO: the closed form if the scene has one, else the
- * golden of the first engine of engine_table.h that has one, else a run of our own. The last one is blind to whatever our
- * renderer does wrong at every number of samples. */
+/* The reference for the squared error. AUTO: the closed form if the scene has one, else the golden of the first
+ * engine of engine_table.h that has one, else a long run of our own. That one cannot show an error of our renderer
+ * that does not depend on the number of samples. */
 enum converge_against {
     AGAINST_AUTO,
     AGAINST_TRUTH,
@@ -26,12 +26,12 @@ struct converge_options {
     int num_rungs;                  /* at least 3 */
     int replicates;                 /* at least 4 */
     int depth_spp; /* samples per pixel of the depth ladder (depth_ladder.h); 0: none */
-    int shrink;    /* images are so many times smaller on both sides */
+    int shrink;    /* width and height of images are divided by this */
     enum converge_against against;
     uint32_t seed;
     double alpha;        /* of all judgements of the run together */
     double margin;       /* largest RMS bias that counts as none, relative */
-    double slope_margin; /* a slope's interval that is wider than +- this decides nothing */
+    double slope_margin; /* INCONCLUSIVE: -1/2 is in the interval, but that is wider than +- this */
     int threads;
     double timeout_s;
     bool quiet;

@@ -11,7 +11,7 @@ static const char *text_of(const json_t *entry, const char *key)
     return v != NULL ? v : "?";
 }
 
-/* Which seeds: the number they were made from, where it was kept, and how many. */
+/* Prints version, seeds (how many, the seed they derive from if it is stored, the first), hashes and date. */
 static void print_provenance(FILE *out, const char *what, const json_t *entry)
 {
     const json_t *seeds = json_object_get(entry, "seeds"), *seed = json_object_get(entry, "seed");
@@ -32,7 +32,7 @@ static json_t *effect_json(const struct comparison *r, double alpha)
                      alpha);
 }
 
-/* A candidate beside what is stored, on its way. */
+/* A candidate and the stored reference that it may replace. */
 struct pair {
     const struct approve_options *opt;
     const struct suite_scene *scene;
@@ -56,7 +56,7 @@ static void pair_close(struct pair *p)
     golden_free(&p->stored);
 }
 
-/* Stores the candidate with one change more than the stored one had. Takes over `change`. */
+/* Stores the candidate, with `change` appended to the stored one's changes. Takes ownership of `change`. */
 static enum approval accept(const struct pair *p, const char *verdict, json_t *change,
                             struct err *e)
 {
@@ -88,7 +88,7 @@ static enum approval refuse_difference(const struct pair *p)
     return APPROVE_DIFFERENT;
 }
 
-/* Bit for bit, whatever else the two files hold. */
+/* Are the moments the same bit for bit? Other contents of the files are not compared. */
 static bool same_moments(const struct moments *a, const struct moments *b)
 {
     size_t pixels = (size_t)a->width * (size_t)a->height;
@@ -99,7 +99,7 @@ static bool same_moments(const struct moments *a, const struct moments *b)
            memcmp(a->m3, b->m3, 3 * pixels * sizeof *a->m3) == 0;
 }
 
-/* Same bits: there is no statistics to do. The manifest may still tell of another scene file or key. */
+/* The same bits: nothing to test. The manifest may still name another scene file or key. */
 static enum approval approve_identical(const struct pair *p, struct err *e)
 {
     fprintf(p->out, "  IDENTICAL: the same bits\n");
@@ -120,7 +120,7 @@ static enum approval approve_incomparable(const struct pair *p, struct err *e)
     return accept(p, "NOT COMPARABLE", json_pack("{s:s}", "why", p->opt->why), e);
 }
 
-/* With the margins of the suite. */
+/* Compares candidate (A) with stored (B), with the margins of the suite. */
 static bool compare(const struct pair *p, struct comparison *out, struct err *e)
 {
     const struct compare_options co = {.alpha = p->opt->alpha,
@@ -207,7 +207,7 @@ enum approval approve(const struct approve_options *opt, const struct suite_scen
     return done;
 }
 
-/* Whatever versions and scene files they were made with, they are to be compared: only a damaged one cannot be. */
+/* References of any version and scene file can be compared, unless one is missing or damaged. */
 static bool can_compare(const struct golden *g, const char *dir, struct err *e)
 {
     if (g->state != GOLDEN_MISSING && g->state != GOLDEN_DAMAGED)

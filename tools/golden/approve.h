@@ -1,5 +1,5 @@
-/* Accepting a newly rendered reference in place of the stored one, or refusing it: what changes is
- * measured and printed first. */
+/* Approves a newly rendered reference (the candidate) in place of the stored one, or refuses it: what
+ * changes is measured and printed first. */
 #ifndef ASSAY_APPROVE_H
 #define ASSAY_APPROVE_H
 
@@ -9,8 +9,8 @@
 #include <stdio.h>
 
 struct approve_options {
-    const char *from_dir, *golden_dir; /* both as reference_render.h says */
-    double alpha;                      /* of one comparison */
+    const char *from_dir, *golden_dir; /* both laid out as by golden_write() */
+    double alpha;                      /* of one comparison's verdict */
     bool accept_new;                   /* where nothing is stored */
     const char *why;                   /* accept a difference for this reason; NULL: refuse it */
 };
@@ -23,8 +23,8 @@ enum approval {
     APPROVE_IMPOSSIBLE /* refused: no candidate, a damaged one, or nothing to compare with; e says */
 };
 
-/* One reference. Prints to `out` the verdict (compare_moments() of candidate against stored, margins of
- * the suite), effect with interval and MDB, provenance of both, and what was done.
+/* Decides on one reference. Prints to `out` the verdict (compare_moments() of candidate against stored, margins of
+ * the suite), the difference with its interval and MDB, the provenance of both, and what was done.
  *
  * What is accepted goes into golden_dir as golden_write() does it; its manifest entry carries
  * "changes", oldest first, one for each approval: {"date", "verdict": "NEW", "IDENTICAL",
@@ -35,8 +35,8 @@ enum approval approve(const struct approve_options *opt, const struct suite_scen
                       const struct suite_reference *ref, FILE *out, struct err *e);
 
 void approve_compare_heading(FILE *out);
-/* Prints a line of that table (both versions, difference, verdict), sets *verdict, stores nothing. False, with a line, if they
- * cannot be compared. opt: from_dir, golden_dir, alpha. */
+/* Prints a row of the table under that heading (both versions, difference, verdict) and sets *verdict; stores
+ * nothing. False, with a line, if the two cannot be compared. Of opt it uses from_dir, golden_dir and alpha. */
 NODISCARD bool approve_compare(const struct approve_options *opt, const struct suite_scene *scene,
                                const struct suite_reference *ref, FILE *out, enum verdict *verdict,
                                struct err *e);

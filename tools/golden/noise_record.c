@@ -12,7 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Ours with both samplers, and the engines that the scene has references of. */
+/* Is the engine's noise recorded? Ours with both samplers, and engines that the scene has references of. */
 static bool is_of(const struct suite_scene *scene, enum converge_engine engine)
 {
     return engine < CONVERGE_REFERENCES ||
@@ -28,10 +28,10 @@ struct recording {
     int shrink;
     struct converge_reference unit;
     struct noise_ladder ladder;
-    char *version; /* of another engine, where it says */
+    char *version; /* of another engine, if known; owned */
 };
 
-/* An engine whose answer has no noise says so; then its ladder has one rung of nothing. */
+/* Renders another engine's ladder. If its images have no noise, it is one rung with variance 0. */
 static bool render_reference(struct recording *r, struct err *e)
 {
     struct suite_scene small = *r->scene;
@@ -83,7 +83,7 @@ static bool render_ours(struct recording *r, struct err *e)
     return ok;
 }
 
-/* With where it comes from. */
+/* The ladder as an entry of noise.json, with its provenance. */
 static json_t *entry_json(const struct recording *r)
 {
     const struct suite_scene *s = r->scene;
@@ -116,7 +116,7 @@ static bool render_one(struct recording r, json_t **entry, struct err *e)
     return ok;
 }
 
-/* Whole, and of this scene and these settings. */
+/* Is the entry whole, and of this scene and its settings? */
 static bool is_current(const json_t *entry, const struct suite_scene *scene, struct err *e)
 {
     struct noise_ladder l;
@@ -162,7 +162,7 @@ bool noise_record_render(const struct reference_command *c, const struct suite_s
     return true;
 }
 
-/* Whatever scene file it was made of. */
+/* Reads an entry, of whatever scene file it was made; other settings must be those of the scene. */
 static bool parse_any(const json_t *entry, const struct suite_scene *scene,
                       struct noise_ladder *out, struct err *e)
 {
@@ -190,7 +190,8 @@ static struct variance_claim judge(const char *what, struct estimate v, struct e
     return c;
 }
 
-/* verdict: also where the two cannot be compared, then "NOT COMPARABLE". */
+/* The entry of "changes", a new reference. If the stored one cannot be compared, its "verdict" is "NOT COMPARABLE", and
+ * *verdict DIFFERENT. */
 static json_t *compare(const json_t *entry, const json_t *was, const struct suite_scene *scene,
                        bool both, double alpha, FILE *out, enum verdict *verdict)
 {
@@ -233,7 +234,7 @@ static bool put(const struct approve_options *opt, const struct suite_scene *sce
     return noise_ladder_store(opt->golden_dir, scene->name, all, e);
 }
 
-/* But for the record of how they came to be stored, which a candidate has where it was itself stored somewhere. */
+/* Are the entries equal but for "changes", which a candidate has if it was itself stored somewhere? */
 static bool is_same(const json_t *entry, const json_t *was)
 {
     json_t *a = json_copy((json_t *)was), *b = json_copy((json_t *)entry);

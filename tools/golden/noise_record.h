@@ -1,26 +1,28 @@
-/* The noise of every engine on a scene (tools/validate/noise_ladder.h): rendered as candidates, and approved in place of what
- * is stored. Of ours it is a record of a former version, never a truth; of another engine what that measured. */
+/* Records of the noise of engines on a scene (tools/validate/noise_ladder.h): rendered as candidates, and approved
+ * in place of those stored. That of our renderer is a record of an earlier version, not a truth; those of others
+ * are measurements. */
 #ifndef ASSAY_NOISE_RECORD_H
 #define ASSAY_NOISE_RECORD_H
 
 #include "approve.h"
 #include "reference_options.h"
 
-/* Renders into --out what is neither there nor in --golden and of this scene and these settings, of ours (both samplers) and of
- * each engine that the scene has as a reference. Images of other engines are half as large on both sides, where that
- * divides: they take minutes. made: one word for all that this command renders. */
+/* Renders the noise of ours (both samplers) and of each engine that is a reference of the scene into --out, unless
+ * a current record is there or in --golden. Width and height of other engines' images are halved if even, as they
+ * take minutes. made: a mark shared by all that this command renders. */
 NODISCARD bool noise_record_render(const struct reference_command *c,
                                    const struct suite_scene *scene, const char *pathtracer,
                                    const char *made, struct err *e);
 
-/* Approves every candidate of the scene. Each is compared with what is stored, with a stale one too: the variance of a sample
- * and of the last rung, by the margins that the stored one declares; of ours only an increase is DIFFERENT. Adds to
- * count[]; why: of the first that is impossible. Nothing where there is no candidate. */
+/* Decides on every candidate of the scene. Each is compared with the stored record, even a stale one: the variances
+ * of a sample and of the last rung, with the margins that the stored one allows; for ours only an increase is
+ * DIFFERENT. count[] is increased for each outcome; why: the line of the first that is impossible. No candidates:
+ * does nothing. */
 void noise_record_approve(const struct approve_options *opt, const struct suite_scene *scene,
                           FILE *out, int count[APPROVE_IMPOSSIBLE + 1], struct err *why);
 
-/* Prints a line for each engine of the scene: current, stale, missing or damaged; how many are not current. Nothing
- * depends on that of another engine: it may be missing. */
+/* Prints a line for each engine of the scene: current, stale, missing or damaged. Returns how many are not current; one
+ * of another engine that is missing is not counted, as nothing depends on it. */
 size_t noise_record_status(const char *golden_dir, const struct suite_scene *scene, FILE *out);
 
 #endif

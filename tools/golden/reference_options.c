@@ -48,7 +48,8 @@ static const struct cli_option options[] = {
     {'h', "help", "", "print this", TO(help), .usage = "usage: assay reference [options]\n"},
     {0}};
 
-/* Of what one engine renders: its own name or that with a version. Which is a reference of the suite, and the only such? */
+/* Sets c->as to the reference that the described engine makes: --as NAME, else the one that is called as the
+ * engine, else the only one called ENGINE-VERSION. */
 static bool choose_name(struct reference_command *c, struct err *e)
 {
     const char *name = c->described.name;
@@ -172,7 +173,8 @@ static bool is_up_to_date(const char *dir, const struct suite_scene *scene,
     return same;
 }
 
-/* What is stored was made with; otherwise a golden approved with another seed would never be up to date. */
+/* The seed of the stored reference, if any: with another default, one approved with its own seed would never be up to
+ * date. */
 static uint32_t stored_seed(const struct reference_command *c, const struct suite_scene *scene,
                             const struct suite_reference *ref)
 {
@@ -204,7 +206,7 @@ bool reference_options_keep(const struct reference_command *c, const struct suit
                             const struct suite_reference *ref, const struct reference_state *state,
                             struct err *e)
 {
-    /* An older candidate must not be approved over what is stored by now. */
+    /* An outdated candidate must not be approved over a stored reference that is up to date. */
     if (state->there == c->golden && !is_up_to_date(c->out, scene, ref, state->key) &&
         !golden_remove(c->out, scene->name, ref->engine, e))
         return false;

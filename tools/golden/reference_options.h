@@ -1,4 +1,4 @@
-/* The command `assay reference`: its arguments, what they select, the state of each reference; for the verb and for
+/* The command line of `assay reference`, the references that it selects and their states; used by the verb and by
  * job_reference.c, which plans it as jobs. */
 #ifndef ASSAY_REFERENCE_OPTIONS_H
 #define ASSAY_REFERENCE_OPTIONS_H
@@ -20,37 +20,37 @@ struct reference_command {
     struct suite suite;
 };
 
-/* Reads the words and the suite, and makes the directory for temporary files. help: it was printed, and no more was
- * done. The caller calls reference_options_free(), also after a failure. */
+/* Reads the command line and the suite, and makes the directory for temporary files. help: it has been printed, and
+ * nothing else is done. The caller calls reference_options_free(), even after a failure. */
 NODISCARD bool reference_options_read(int argc, char **argv, struct reference_command *c,
                                       struct err *e);
 void reference_options_free(struct reference_command *c);
 
-/* Is the scene asked for, and has references of its own? */
+/* Is the scene selected, and has it references of its own? */
 bool reference_options_selects(const struct reference_command *c, const struct suite_scene *scene);
-/* Calls one() for each reference that is asked for, in the order of the suite, as long as it returns true. Fails if there is
- * none. */
+/* Calls one() for each selected reference, in the order of the suite, until it returns false. Fails then, and if no
+ * reference is selected. */
 NODISCARD bool reference_options_each(const struct reference_command *c,
                                       bool (*one)(void *ctx, const struct suite_scene *scene,
                                                   const struct suite_reference *ref, struct err *e),
                                       void *ctx, struct err *e);
 
-/* How one of them would be made, and where it is up to date already. */
+/* How a reference would be rendered, and where an up-to-date one is stored. */
 struct reference_state {
     struct reference_options opt; /* with its seed */
     char key[65];                 /* reference_key() */
-    const char *there;            /* --golden or --out; NULL: to be rendered */
+    const char *there;            /* in --golden or --out; NULL: to be rendered */
 };
 NODISCARD bool reference_options_state(const struct reference_command *c,
                                        const struct suite_scene *scene,
                                        const struct suite_reference *ref,
                                        struct reference_state *out, struct err *e);
-/* Says that it is up to date; a candidate that is older than what is stored is removed. */
+/* Prints that it is up to date. If that is in --golden, removes a candidate in --out that is not. */
 NODISCARD bool reference_options_keep(const struct reference_command *c,
                                       const struct suite_scene *scene,
                                       const struct suite_reference *ref,
                                       const struct reference_state *state, struct err *e);
-/* Writes it to --out with the key in its manifest, and says so. */
+/* Writes a rendered reference to --out, with the key in its manifest, and prints that. */
 NODISCARD bool reference_options_write(const struct reference_command *c,
                                        const struct suite_scene *scene,
                                        const struct suite_reference *ref, const char *key,

@@ -12,7 +12,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-/* In the folder, and where it is from in share. */
+/* File in the folder, its source in share_dir, and its mode. */
 static const struct {
     const char *to, *from;
     mode_t mode;

@@ -21,8 +21,8 @@ enum { MAX_ARGS = 96, TEXT = 8192 };
 static const unsigned long long answer_seed = 0x9e3779b97f4a7c15u;
 static const char twin_seed[] = "--seed 14057662040733408311";
 
-/* Our command for an image: that of the assignment, which our renderer understands, in the directory in which
- * "scene" is staged. */
+/* The command by which our renderer makes an image, with the assignment's options; it runs in the
+ * directory that has "scene" staged. */
 static bool command_of(const struct rubric *r, const struct rubric_image *p, const char *words,
                        const struct answer_options *opt, const char *out, char *text,
                        const char **argv, struct err *e)
@@ -43,7 +43,8 @@ static bool command_of(const struct rubric *r, const struct rubric_image *p, con
            err_set(e, "%s:%d: the command of '%s' is too long", r->path, p->line, p->name);
 }
 
-/* All that decides our render: the words of its command and the files of the scene. */
+/* Hash of all that decides our render: the version, the words of its command but the threads, the
+ * files of the scene. */
 static bool key_of(const char *const *argv, const char *scene_file, const char *environment,
                    char key[65], struct err *e)
 {
@@ -86,7 +87,8 @@ static bool make_render(const struct rubric *r, const struct rubric_image *p, co
     return true;
 }
 
-/* words: besides those of the image; "" none. */
+/* Reads a render of ours from the cache, or makes it. words: options besides those of the image;
+ * "": none. */
 static bool render_ours(const struct rubric *r, const struct rubric_image *p, const char *words,
                         const struct answer_options *opt, struct moments *out, struct err *e)
 {
@@ -170,7 +172,8 @@ static bool twin_of(const struct rubric *r, int image, const struct answer_optio
                              e);
 }
 
-/* How many samples each pixel takes, where a check wants to know. */
+/* Render with the student's options, for the samples of each pixel, if a check of rates needs
+ * them. */
 static bool as_asked(const struct rubric *r, int image, const char *words,
                      const struct answer_options *opt, struct moments *out, struct err *e)
 {

@@ -9,12 +9,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* How well an effect of our renderer is that of another program with the same bug. */
+/* Relative error of a bug's effect, measured with our renderer, for another program with that
+ * bug. */
 static const double effect_error = 0.03;
-/* What is cut off at the brightest code depends on how a program's noise is distributed: of cells brighter than this
- * share of it, so much of their radiance may be off, all in one direction. */
+/* Clipping at the brightest code depends on the distribution of a program's noise: cells brighter
+ * than `bright` times that code may be off by `clip_error` of their radiance, all with the same
+ * sign. */
 static const double bright = 0.5, clip_error = 0.05;
-/* What a bug makes darker than this share of the right image is measured against that share. */
+/* Relative differences are taken over at least this share of the right image, as a bug may make a
+ * cell black. */
 static const double dark = 0.1;
 
 /* ---- which part pays? */
@@ -86,7 +89,8 @@ static bool shows(const struct carry *w, int bug, const struct rubric_check *c)
     return false;
 }
 
-/* The earliest part that loses and shows the bug; if none does, that loses. */
+/* The part of the first check that lost points and shows the bug; else of the first that lost
+ * points; -1: none did. */
 static int earliest(const struct carry *w, int bug, const struct result *result)
 {
     int first = -1;
@@ -100,7 +104,9 @@ static int earliest(const struct carry *w, int bug, const struct result *result)
     return first;
 }
 
-/* In its own part, of several that cannot be told apart in the earliest of theirs, if that loses points. */
+/* A bug is paid in its own part if that lost points; of bugs that cannot be told apart, in the
+ * earliest such part; else by earliest(). member: 0 or 1, the first or the second bug of the
+ * diagnosis. */
 static void find_payer(struct carry *w, const struct diagnosis *found, int member,
                        const struct result *result)
 {
@@ -122,16 +128,17 @@ static void find_payer(struct carry *w, const struct diagnosis *found, int membe
 
 /* ---- judged with a bug */
 
-/* A combination of the images of a check, cell by cell: what is seen, and what should be with the bugs. */
+/* The signed sum of a check's images, cell by cell: as seen, and as expected with the bugs. */
 struct cells {
     int columns, rows, cell;
     double seen[SIGNATURE_VALUES], expected[SIGNATURE_VALUES], var[SIGNATURE_VALUES];
-    double bias[SIGNATURE_VALUES]; /* by which the difference may be off, all cells the same way */
+    double bias[SIGNATURE_VALUES]; /* bound of the systematic error, of one sign in all cells */
     double
         base[SIGNATURE_VALUES]; /* expected of the first image: what differences are relative to */
 };
 
-/* sign: +1, -1. bugs: bit k for w->bug[k]. */
+/* Adds sign (+1, -1) times an image. bugs: bit k adds the effect of w->bug[k] to what is
+ * expected. */
 static bool add_image(const struct carry *w, int image, int sign, int bugs, struct cells *out,
                       struct err *e)
 {
@@ -195,7 +202,8 @@ static struct sums sum_of(const struct cells *s, int x, int y, int side_x, int s
     return sum;
 }
 
-/* As difference_measure(), of whole cells, whose noise is known: no pixel of a wrong image need be like ours. */
+/* As difference_measure(), but of whole cells, whose variance is known: pixels of a wrong image
+ * need not resemble ours. */
 static bool measure(const struct cells *s, double alpha, struct difference *out, struct err *e)
 {
     int side = s->cell < RUBRIC_TILE ? RUBRIC_TILE / s->cell : 1;
@@ -243,7 +251,7 @@ static void score(const struct rubric_check *c, struct result *out)
     grade_checks_tell(d, out->seen, sizeof out->seen);
 }
 
-/* Of exact: the share of lit cells that are off. */
+/* For checks of kind exact: share of the lit cells that are wrong; 1 if none is lit. */
 static double share_off(const struct cells *s)
 {
     static const double allowed_sd = 6, codes = 2e-3;
@@ -260,7 +268,7 @@ static double share_off(const struct cells *s)
     return lit > 0 ? (double)off / lit : 1;
 }
 
-/* *is_judged: false where this kind, or an image without a view, is left as it is. */
+/* *is_judged: false where the check stays as it is: kind noise, or an image without a view. */
 static bool judge(const struct carry *w, const struct rubric_check *c, int bugs, struct result *out,
                   bool *is_judged, struct err *e)
 {

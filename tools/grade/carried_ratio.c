@@ -8,7 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Mean luminance, by a mask: what shines, and what is cut off, tells nothing. */
+/* Mean luminance over use[] without masked pixels; 0 if there are none. Clipped pixels, such as
+ * lamps, say nothing. */
 static double brightness(const struct rubric *r, const double *mean, int width, int height,
                          const unsigned char *use)
 {
@@ -36,7 +37,7 @@ static void leave_bright(const double *mean, size_t pixels, double clip, unsigne
             use[i / 3] = 0;
 }
 
-/* Luminance of an image's tiles, to be freed; NULL: out of memory. */
+/* Clipped luminance of each tile, summed over its pixels; the caller frees. NULL: out of memory. */
 static double *tiles_of(const double *mean, int width, int height, double clip)
 {
     int columns = width / RUBRIC_TILE, rows = height / RUBRIC_TILE;
@@ -50,7 +51,8 @@ static double *tiles_of(const double *mean, int width, int height, double clip)
     return tile;
 }
 
-/* Of two images' tiles, the largest over mirrored ones, as a camera may be wrong in that way. */
+/* Correlation of the tiles of two images, the largest of the four mirrorings, as a wrong camera may
+ * mirror. */
 static double correlation(const double *u, const double *v, int columns, int rows)
 {
     double n = columns * rows, best = -1;
@@ -81,7 +83,8 @@ static double spread_of(const double *tile, int columns, int rows)
     return mean > 0 ? gsl_stats_sd_with_fixed_mean(tile, 1, num, mean) / mean : INFINITY;
 }
 
-/* Does it show what m shows? Of what is nearly of one radiance nothing can be seen but that it is: even_too says whether that is enough. */
+/* Does the image show what m shows? Nearly uniform images do not correlate: with even_too it is
+ * enough that both are so. */
 static bool is_like(const struct submitted_image *s, const struct moments *m, bool even_too,
                     bool *is, struct err *e)
 {
@@ -98,7 +101,7 @@ static bool is_like(const struct submitted_image *s, const struct moments *m, bo
     return ok;
 }
 
-/* Only that it draws the scene matters for its times. */
+/* Times count as long as the image shows the scene. */
 static bool carry_growth(const struct grading *g, int set, const struct rubric_check *c,
                          struct result *out, struct err *e)
 {
@@ -117,13 +120,14 @@ static bool carry_growth(const struct grading *g, int set, const struct rubric_c
     return true;
 }
 
-/* Is the ratio of two images one that others do not have? */
+/* Is a ratio far enough from 1 (10 %) to be evidence? */
 static bool is_telling(double ratio)
 {
     return fabs(log(ratio)) > 0.1;
 }
 
-/* An image that shows no more than the earlier one has the ratio B/P: half way there nothing is left. */
+/* An image that adds nothing to the earlier one has R = B/P; halfway there, in logarithms, no
+ * points are left. */
 static struct margin margin_of(const struct margin *given, double expected)
 {
     static const double least = 0.5;
@@ -140,7 +144,8 @@ static bool same_view(const struct rubric_image *a, const struct rubric_image *b
            a->width == b->width && a->height == b->height;
 }
 
-/* Is it what the earlier image of the view should be, in each channel and tile, so that it shows no bounce more than that? */
+/* Does the image agree, in each channel and tile, with the reference of the earlier image of the
+ * same view, although it should have more bounces? Then it lacks them. */
 static bool is_what_was_asked_before(const struct grading *g, const struct rubric_check *c,
                                      bool *is, struct err *e)
 {
@@ -173,8 +178,9 @@ static bool is_what_was_asked_before(const struct grading *g, const struct rubri
     return ok;
 }
 
-/* P/B as it should be where a wrong BSDF makes B, direct light, s times as bright: each bounce has the factor once more. Of an image
- * of all bounces their radiances are taken for a geometric series; an image that is darker than B shows the last alone. */
+/* Expected P/B if a wrong BSDF makes direct light, B, s times as bright, and every further bounce s
+ * times again. right: P/B of the references. The radiances of successive bounces are taken for a
+ * geometric series; right < 1: P is the last bounce alone. */
 static double ratio_of_bounces(double right, double s, int bounces)
 {
     if (right < 1)
@@ -208,7 +214,8 @@ static bool carry_ratio(const struct grading *g, int set, const struct rubric_ch
     if (use == NULL)
         return err_set(e, "out of memory");
     unsigned char *own = use + pixels;
-    /* What is cut off lies elsewhere where the camera is wrong, and in more places where all is too bright. */
+    /* A wrong camera clips other pixels, and an image that is too bright more of them: first each
+     * side by a mask of its own, then both by the pixels that neither clips. */
     memset(use, 1, 2 * pixels);
     leave_bright(p->mean, pixels, clip, own);
     leave_bright(b->mean, pixels, clip, own);
@@ -229,7 +236,8 @@ static bool carry_ratio(const struct grading *g, int set, const struct rubric_ch
     free(use);
     if (isnan(v) || fabs(other) < fabs(v))
         v = other;
-    /* By a small factor little is left of the bounces: whether they are there is not to be seen. */
+    /* Not where the expected ratio is near 1: with so small a factor missing bounces could not be
+     * seen. */
     if (is_telling(bounced) && fabs(log(theirs / bounced)) < fabs(v)) {
         v = log(theirs / bounced);
         right = bounced;
@@ -261,7 +269,8 @@ static bool is_there(const struct submitted_images *h, const struct rubric_check
     return true;
 }
 
-/* Did a check of an earlier part lose points that looks at this image? of -1: at one of the scene of `like`. */
+/* Did an earlier part lose points in a check of this image? image -1: of any image with the view of
+ * `like`. */
 static bool was_lost(const struct rubric *r, const struct rubric_check *c, int image,
                      const struct rubric_image *like, const double *share)
 {
@@ -275,7 +284,8 @@ static bool was_lost(const struct rubric *r, const struct rubric_check *c, int i
     return false;
 }
 
-/* Has an image of the scene been found right by an earlier part, or carried? */
+/* Does an earlier part have a check `equal` of this view with all its points, carried ones
+ * included? */
 static bool is_drawn(const struct rubric *r, const struct rubric_check *c,
                      const struct result *result)
 {
@@ -286,7 +296,8 @@ static bool is_drawn(const struct rubric *r, const struct rubric_check *c,
     return false;
 }
 
-/* How many samples a wrong image takes differs a little from a right one, or is what the rule takes with its light and noise. */
+/* A wrong image may take a few samples more or less than ours, or as many as the rule takes with
+ * its own light and noise: whichever gives more points. */
 static bool carry_rates(const struct grading *g, int set, const struct rubric_check *c,
                         struct result *out, struct err *e)
 {
@@ -322,7 +333,8 @@ static bool carry_rates(const struct grading *g, int set, const struct rubric_ch
     return true;
 }
 
-/* Another image of the same light with more samples, whose noise is low: -1: none. */
+/* Index of another image of the same view, bounces and options with at least 4 times the samples;
+ * -1: none. */
 static int quieter(const struct rubric *r, const struct submitted_images *h, int image)
 {
     const struct rubric_image *p = &r->image[image];
@@ -336,7 +348,7 @@ static int quieter(const struct rubric *r, const struct submitted_images *h, int
     return -1;
 }
 
-/* Noise is measured against the program's own image, if that is not what it should be. */
+/* Measures noise against the program's own image with more samples, which may be wrong. */
 static bool carry_noise(const struct grading *g, const struct rubric_check *c, struct result *out,
                         struct err *e)
 {
@@ -385,7 +397,8 @@ bool carried_by_ratio(const struct grading *g, int set, const double *share, con
         const struct rubric_image *p = &r->image[c->images[0]];
         if (result[i].share == 1 || paid[c->part] || !result[i].judged || !is_there(g->h, c))
             continue;
-        /* Deviations that are accepted are not recognised where a mistake is in all images that show them. */
+        /* All sets are tried: a mistake in every image that shows an accepted deviation hides it
+         * (grade_all_checks()). */
         if (c->after >= 0 && was_lost(r, c, c->after, p, share)) {
             bool shows_no_more;
             ok = is_what_was_asked_before(g, c, &shows_no_more, e);

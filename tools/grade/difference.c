@@ -8,7 +8,8 @@
 
 static const double least_kappa = 0.05, overlap = 4, runs_shared = 1.5, channels_alike = 3,
                     floor_fraction = 0.25, missed = 0.25;
-/* Where noise is too small to be seen, or in too few pixels, it is taken to be that of our renders. */
+/* A tile's kappa with fewer degrees of freedom is not used; so many has the kappa of 1 that is
+ * assumed where there are fewer than FEWEST second differences. */
 static const double unknown_dof = 30;
 static const double least_used = 0.25; /* of a tile, of the image */
 enum { FEWEST = 60 };                  /* second differences */
@@ -29,13 +30,14 @@ struct pair {
     const unsigned char *use;
 };
 
-/* Sums for the slope of r^2 - c on m with weights w = 1/(m + c)^2: of v = w m^2 and u = w m (r^2 - c), so that kappa = u/v,
- * and of their squares and products, so that what is left, of u - kappa v, has the sum of squares uu - 2 kappa uv + kappa^2 vv. */
+/* Weighted least squares of r^2 - c = kappa m with w = 1/(m + c)^2: sums of u = w m (r^2 - c) and v
+ * = w m^2, so that kappa is u/v, and of their squares and product: the residuals u - kappa v have
+ * the sum of squares uu - 2 kappa uv + kappa^2 vv. */
 struct slope {
     double num, u, v, uu, uv, vv;
 };
 
-/* A square of the image, as far as it lies within. */
+/* A square, clipped to the image. */
 static struct rect within(const struct submitted_image *s, int x, int y, int side)
 {
     int x0 = x < 0 ? 0 : x, y0 = y < 0 ? 0 : y, x1 = x + side, y1 = y + side;
@@ -71,7 +73,8 @@ static void add_square(double r, double m, double known, double rounding, struct
     s->vv += v * v;
 }
 
-/* Second difference of a channel of `of` at a place, and the variance of it by its planes. */
+/* Second difference of one channel at a pixel, with the variances that the image's planes give
+ * it. */
 struct second {
     double value, variance, rounding;
 };
@@ -101,7 +104,7 @@ static void add_place(const struct pair *p, int x, int y, size_t c, struct slope
                s);
 }
 
-/* Each run of A less the next, at one pixel, whatever is wrong with both. */
+/* Adds the differences of successive runs of A at one pixel; errors that both have cancel. */
 static void add_runs(const struct pair *p, int x, int y, size_t c, struct slope *s)
 {
     size_t i = 3 * ((size_t)y * (size_t)p->a->width + (size_t)x) + c;
@@ -163,12 +166,13 @@ static struct noise noise_in_image(const struct pair *p)
     return noise_by(p, &s);
 }
 
-/* Of the image, and of each whole tile with the eight around it, by rows, which the caller frees. */
+/* Noise of the image, and of each whole tile pooled with the eight around it, by rows; the caller
+ * frees *of_tile. */
 static bool noises_of(const struct pair *p, struct noise *image, struct noise **of_tile,
                       struct err *e)
 {
     const int columns = p->a->width / RUBRIC_TILE, rows = p->a->height / RUBRIC_TILE;
-    /* Of all tiles, the last may be cut off. */
+    /* All tiles, also partial ones at the right and the bottom. */
     const int across = (p->a->width + RUBRIC_TILE - 1) / RUBRIC_TILE,
               down = (p->a->height + RUBRIC_TILE - 1) / RUBRIC_TILE;
     struct slope *slope = calloc((size_t)across * (size_t)down, sizeof *slope);
@@ -200,7 +204,7 @@ static bool noises_of(const struct pair *p, struct noise *image, struct noise **
 /* Sums over a region, one channel. */
 struct sums {
     double d, b, v, k3, tolerance, used;
-    double v2; /* where v is measured: of its squares */
+    double v2; /* where v is measured: sum of v^2 */
 };
 
 static double weighted(const double *x, int channel)
@@ -208,7 +212,8 @@ static double weighted(const double *x, int channel)
     return channel < CHANNEL_LUMINANCE ? x[channel] : luminance(x);
 }
 
-/* For any correlation of the channels (pyramid.h). */
+/* One channel, or for luminance (sum of w x^(1/power))^power: a bound for any correlation of the
+ * channels (pyramid.h). */
 static double weighted_root(const double *x, int channel, double power)
 {
     double sum = 0;
@@ -219,7 +224,7 @@ static double weighted_root(const double *x, int channel, double power)
     return copysign(pow(fabs(sum), power), sum);
 }
 
-/* From run to run in both, or in A against a reference. */
+/* Are variances measured from run to run: in both, or in A against a reference? */
 static bool is_measured(const struct pair *p)
 {
     return p->a->runs_dof > 0 && (p->b->known || p->b->runs_dof > 0);
@@ -265,9 +270,10 @@ static struct sums sum_pixels(const struct pair *p, struct rect r, int channel, 
     return s;
 }
 
-/* False: too skewed for that; then by the bound of a sum with tails no longer than exponential, sd (sqrt(2 t) + g/2 t) with
- * t = ln(2/alpha) (Bernstein). `alpha` two-sided; divided by what skewness may do to the tail of a sum whose variance is known
- * from elsewhere, exp(g x^3/6) (Cramer), at most e. */
+/* Student's t interval of s->d, relative to `unit`. alpha, two-sided, is divided by what skewness g
+ * may do to the tail of a sum whose variance is known from elsewhere, exp(g x^3/6) (Cramer), at
+ * most e. False: more than e; the interval is then Bernstein's for tails at most exponential, sd
+ * (sqrt(2 t) + g/2 t) with t = ln(2/alpha). */
 static bool interval_from(const struct sums *s, double unit, double dof, double alpha,
                           struct interval *out)
 {
@@ -284,14 +290,15 @@ static bool interval_from(const struct sums *s, double unit, double dof, double 
     return factor < 1;
 }
 
-/* Degrees of freedom of v: E[v^2] = s^4 (1 + 2/d) of one with d. */
+/* Degrees of freedom of the sum v of measured variances (Satterthwaite): one with d of them has
+ * E[v^2] = sigma^4 (1 + 2/d). */
 static double measured_dof(const struct pair *p, const struct sums *s)
 {
     double d = fmin(p->a->runs_dof, p->b->known ? INFINITY : p->b->runs_dof);
     return s->v2 > 0 ? fmax(3, (d + 2) * s->v * s->v / s->v2) : 1e6;
 }
 
-/* noise: of the tile and what is around it. */
+/* noise: of the tile pooled with its neighbours. */
 static void measure_tile(const struct pair *p, struct rect r, struct noise noise,
                          const struct noise *whole, double floor, double alpha, double *furthest,
                          double *relative, struct difference *out)
@@ -299,7 +306,7 @@ static void measure_tile(const struct pair *p, struct rect r, struct noise noise
     if (!noise.known || noise.dof < unknown_dof || noise.kappa <= whole->kappa)
         noise = *whole;
     struct sums s = sum_pixels(p, r, CHANNEL_LUMINANCE, noise.kappa);
-    if (is_measured(p)) { /* what is rare may have been missed in one tile */
+    if (is_measured(p)) { /* rare samples may be missing in one tile */
         struct sums wide =
             sum_pixels(p, within(p->a, r.x - RUBRIC_TILE, r.y - RUBRIC_TILE, 3 * RUBRIC_TILE),
                        CHANNEL_LUMINANCE, noise.kappa);
@@ -315,7 +322,7 @@ static void measure_tile(const struct pair *p, struct rect r, struct noise noise
         return;
     *relative = interval.value;
     out->tiles++;
-    /* Among tiles that agree: the one that is least sure to. */
+    /* Among tiles that agree, the one whose interval reaches furthest. */
     double distance =
         interval_distance(&interval) + 1e-9 * fmax(fabs(interval.lo), fabs(interval.hi));
     if (distance <= *furthest)

@@ -18,10 +18,10 @@ struct difference {
     struct interval
         image[NUM_CHANNELS]; /* relative difference of the means of R, G, B, luminance */
     double blur[NUM_CHANNELS +
-                1];       /* of these, and of `tile`: the part of half the width that is not noise */
+                1];       /* of these, then of `tile`: share of half the width due to rounding */
     struct interval tile; /* of the tile furthest from agreeing, luminance */
     int tile_x, tile_y;   /* pixels */
-    int tiles;            /* that could be judged */
+    int tiles;            /* number of tiles judged */
     double compared;      /* share of the pixels */
     double kappa;         /* noise variance over that of our renderer */
     bool skewed;          /* rare bright pixels make an interval of the image wide */
@@ -36,14 +36,15 @@ struct difference {
  * E[r^2] = kappa m + c, with m from those variances and c from rounding and from a B whose variance is
  * known. kappa, the student's noise over ours, is the weighted least squares slope, at least 0.05. The
  * image has one; a tile has that of the 3 x 3 tiles around it if that is larger and known well enough
- * (30 degrees of freedom). Var(kappa) comes from the residuals, times 4 for r that overlap and times 3
- * for channels that one light makes alike; it gives the degrees of freedom of Student's t. Errors as
- * fine as a pixel count as noise, and make the interval wide.
+ * (30 degrees of freedom). Var(kappa) comes from the residuals, times 4 as the r overlap and times 3 as
+ * the channels are correlated; it gives the degrees of freedom of Student's t. Errors as fine as a
+ * pixel count as noise, and make the interval wide.
  *
- * Noise, several runs. If A has several runs and B is a reference, r is the difference of two runs at
- * one pixel, from which errors that both have cancel. If, besides, B is a reference or has several
- * runs, intervals need no kappa: variances are measured pixel by pixel from run to run. A tile has at
- * least a quarter of the variance of the tiles around it, in proportion to its light.
+ * Noise, several runs. If A has several runs and B is a reference, r is the difference of successive
+ * runs at one pixel, in which errors common to both cancel (1.5 in place of the 4). If A has several
+ * runs and B is a reference or has several, too, intervals need no kappa: variances are measured pixel
+ * by pixel from run to run. A tile has at least a quarter of the variance of the tiles around it, in
+ * proportion to its light.
  *
  * Skewness is that of our samples. Where it may change a tail probability by more than a factor of e
  * (tools/docs/background/verdict.md, "EQUIVALENT"), the interval is one for tails that are at most
@@ -58,19 +59,20 @@ NODISCARD bool difference_measure(const struct submitted_image *a, const struct 
                                   struct err *e);
 void difference_free(struct difference *a);
 
-/* kappa of the image. */
+/* kappa of the image: its noise variance over that of our renderer. */
 double difference_kappa(const struct submitted_image *a, const struct submitted_image *reference,
                         const unsigned char *use);
 
-/* kappa of each tile, by rows, from the tiles around it, or that of the image where these say too
- * little. *sd: standard deviation of the logarithm of the image's kappa. */
+/* kappa of each whole tile, by rows, pooled over the 3 x 3 tiles around it, or that of the image
+ * where these say too little. *sd: standard deviation of ln kappa of the image. Fails only out of
+ * memory. */
 NODISCARD bool difference_kappas(const struct submitted_image *a,
                                  const struct submitted_image *reference, const unsigned char *use,
                                  double *kappa, double *sd, struct err *e);
 
 /* Are the errors of two runs, in second differences, correlated by more than 6 standard deviations?
- * (For independent runs the correlation has the variance 1/n, times 4 for overlap and 3 for channels
- * that are alike; what the noise of the reference adds to both is subtracted.) Errors as fine as a
+ * (For independent runs the correlation has the variance 1/n, times 4 for overlap and 3 for correlated
+ * channels; what the noise of the reference adds to both is subtracted.) Errors as fine as a
  * pixel that both runs make have the same effect; either way the mean of the two is worth no more than
  * one run. */
 NODISCARD bool difference_correlated(const struct submitted_image *a,

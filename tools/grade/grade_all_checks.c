@@ -26,7 +26,8 @@ static bool grade_with(const struct grading *g, int set, struct result *out, dou
     return true;
 }
 
-/* An image that is wrong against our own reference and right against another, as far as it matters. */
+/* Did the check of an image lose points against the plain reference, and none, undecided ones
+ * included, with deviations? */
 static bool is_explained(const struct rubric_check *c, double plain, const struct result *with)
 {
     return plain < 1 && with->share == 1 && with->more == 0 &&

@@ -44,7 +44,7 @@ void grade_checks_tell(const struct difference *a, char *text, size_t size)
                     a->tile_y, 100 * a->tile.value, 100 * a->tile.lo, 100 * a->tile.hi);
 }
 
-/* One more interval that decides: the smallest share counts. */
+/* Takes one more interval into account: the smallest share counts. */
 static void judge(const struct judging *w, const struct margin *m, const struct interval *i,
                   double blur, struct result *out)
 {
@@ -104,7 +104,8 @@ static double skewness_of(const struct submitted_image *s, const unsigned char *
     return k3;
 }
 
-/* A against B; what keeps them from being compared, but for memory, is the student's to mend. */
+/* Compares A with B and scores it. If they cannot be compared, out->seen says why, for the student
+ * to mend; fails only out of memory. */
 static bool compare(const struct judging *w, const struct submitted_image *a,
                     const struct submitted_image *b, struct result *out, struct err *e)
 {
@@ -125,8 +126,8 @@ static bool compare(const struct judging *w, const struct submitted_image *a,
     return true;
 }
 
-/* The rule of stopping is biased, which is not the student's fault: against what it does to noise
- * like his. */
+/* Compares again, allowing for the bias of the assignment's stopping rule at the student's noise:
+ * it is not the student's fault. */
 static bool compare_stopped(struct judging *w, double blind, struct result *out, struct err *e)
 {
     struct submitted_image *right = &w->compare[0];
@@ -175,7 +176,7 @@ static bool check_equal(struct judging *w, struct result *out, struct err *e)
     return true;
 }
 
-/* A copy of q, moved by the difference of two references, with their noise. */
+/* q plus the difference of two references, to - from, with the noise of all three. */
 static bool moved(const struct submitted_image *q, const struct moments *to,
                   const struct moments *from, struct submitted_image *out, struct err *e)
 {
@@ -194,7 +195,7 @@ static bool moved(const struct submitted_image *q, const struct moments *to,
     return ok;
 }
 
-/* To what its codes tell. */
+/* Black, as far as its codes can tell. */
 static bool is_black(const struct submitted_image *s)
 {
     for (size_t i = 0; i < 3 * (size_t)s->width * (size_t)s->height; i++)
@@ -242,7 +243,7 @@ static bool check_sum(struct judging *w, struct result *out, struct err *e)
     return compare(w, judging_student(w, 0), sum, out, e);
 }
 
-/* One wrong pixel: the share of its tile's, and which tile has most. */
+/* Adds a wrong pixel to its tile's share, and keeps the tile with the largest. */
 static void map_wrong(struct difference *map, int columns, int x, int y)
 {
     double *here = &map->relative[y / RUBRIC_TILE * columns + x / RUBRIC_TILE];
@@ -255,8 +256,8 @@ static void map_wrong(struct difference *map, int columns, int x, int y)
     map->tile_y = y / RUBRIC_TILE * RUBRIC_TILE;
 }
 
-/* An image without noise but for where in the pixel its rays fell: 6 standard deviations of a
- * sample mean, by the reference's own samples, and the rounding to codes. */
+/* The only noise is where in a pixel rays fall: allowed are 6 standard errors of the mean, by the
+ * reference's own samples, and the rounding to codes. */
 static bool check_exact(struct judging *w, struct result *out, struct err *e)
 {
     static const double allowed_sd = 6;
@@ -338,7 +339,7 @@ static bool check_growth(struct judging *w, struct result *out, struct err *e)
 {
     if (!check_equal(w, out, e))
         return false;
-    bool is_wrong = out->share < 0.5; /* black is off by less than 100 % of it */
+    bool is_wrong = out->share < 0.5; /* not 0: a black image's interval starts inside -100 % */
     grade_checks_growth(w->g, w->check, out);
     if (is_wrong && w->g->h->made[w->check->images[0]].cpu_s > 0) {
         out->share = 0;

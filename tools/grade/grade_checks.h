@@ -15,9 +15,10 @@ struct answer {
     struct moments
         noise; /* of a render by ours: how its samples vary; m itself where that is ours */
     struct moments
-        as_asked; /* by ours as the program is asked, where a check of rates needs it; else width 0 */
+        as_asked; /* by ours with the student's options too, for checks of rates; else width 0 */
 };
-/* By set of accepted deviations (rubric.h). What is empty in a later set is as in the first. */
+/* Indexed by set of accepted deviations (rubric.h). An empty entry of a later set equals that of
+ * set 0. */
 struct answer_key {
     struct answer of[RUBRIC_SETS][RUBRIC_IMAGES];
 };
@@ -28,6 +29,8 @@ struct answer_options {
     int threads;
     double timeout_s;
 };
+/* Reads or renders what every image of the rubric should be. Fails with a line, and nothing to free;
+ * else the caller frees *out with answer_key_free(). */
 NODISCARD bool answer_key_make(const struct rubric *r, const struct answer_options *opt,
                                struct answer_key *out, struct err *e);
 void answer_key_free(struct answer_key *a);
@@ -39,15 +42,15 @@ int answer_key_set(const struct rubric *r, const char *name);
 const struct moments *answer_key_image(const struct answer_key *a, int set, int image);
 const struct moments *answer_key_counts(const struct answer_key *a, int set, int image);
 
-/* Renders one image by opt->pathtracer with spp samples a pixel and the further options `words`: with the
- * options of its reference or, as_asked, with the student's, too. Scenes have been staged in
- * opt->cache/scene (submission_stage()). */
+/* Renders one image by opt->pathtracer with spp samples a pixel and the further options `words`,
+ * besides the options of its reference; as_asked: also with the student's. Scenes have to be staged
+ * in opt->cache/scene (submission_stage()). The caller frees *out with moments_free(). */
 NODISCARD bool answer_key_render(const struct rubric *r, int image, bool as_asked,
                                  const char *words, int spp, const struct answer_options *opt,
                                  struct moments *out, struct err *e);
 
 struct result {
-    double share;  /* 0 .. 1 of the points */
+    double share;  /* of the points, 0 to 1 */
     double chance; /* score_chance() of what decided */
     bool
         judged; /* false: we could not judge, through no fault of the student's: `seen` says why; share
@@ -55,8 +58,8 @@ struct result {
     double
         more; /* > 0: undecided, it takes about so many times the samples; share is the most it may get */
     double noise
-        [CHECK_IMAGES]; /* variance that each image of the check adds, in some unit; or skewness, where
-                         * that keeps it undecided */
+        [CHECK_IMAGES]; /* variance that each image of the check adds, in arbitrary units; or skewness,
+                         * where that keeps it undecided */
     char expected[256], seen[400];
     char accepted[160]; /* the deviations by which it has more points than without, or "" */
     char carried[512];  /* what was paid before and is taken for granted here (carried.h), or "" */
@@ -77,7 +80,7 @@ struct submitted_images {
     char why[RUBRIC_IMAGES][400];                /* why not */
     bool can_buy;              /* further runs are possible: what is too noisy stays undecided */
     bool fixed[RUBRIC_IMAGES]; /* but not of this image, whose noise does not fall with samples */
-    int runs[RUBRIC_IMAGES];   /* made of it, whether they count or not */
+    int runs[RUBRIC_IMAGES];   /* number of runs of it, whether they count or not */
     double bought_s;           /* CPU time of further runs */
 };
 
@@ -108,8 +111,8 @@ void grade_checks_rates(const struct grading *g, int set, const struct rubric_ch
 /* All checks, out[0 .. num_checks-1], graded with the set of accepted deviations that leaves the
  * most points. The empty set wins unless another brings more than 1 % of all points and some check of
  * an image that loses points without it loses none with it, and not because it is noisy: a bug that
- * merely resembles a deviation is not excused. Other mistakes still cost points. On failure
- * there is nothing to free. */
+ * merely resembles a deviation is not excused. Other mistakes still cost points. The caller frees
+ * each result with result_free(); on failure there is nothing to free. */
 NODISCARD bool grade_all_checks(const struct grading *g, struct result *out, int *set,
                                 struct err *e);
 void result_free(struct result *r);

@@ -7,7 +7,8 @@
 #include <math.h>
 #include <stdio.h>
 
-/* By what the rule gives for a program with as much noise: `ours` is the mean of our counts. */
+/* Widens the interval by what the stopping rule may do at the student's noise. ours: mean of our
+ * counts. */
 static bool widen_count(struct judging *w, double ours, struct interval *count, struct result *out,
                         struct err *e)
 {
@@ -68,7 +69,7 @@ void grade_checks_rates(const struct grading *g, int set, const struct rubric_ch
     const struct rubric_image *p = &g->r->image[image];
     struct stopping by[NUM_STOPPING_KINDS];
     struct rate_image rates;
-    struct err why; /* which has been said */
+    struct err why; /* ignored: grade_checks_judge_rates() has reported it */
     if (!rate_image_read(g->h->made[image].rates, p, c->batch, answer_key_counts(g->a, set, image),
                          &rates, &why) ||
         !stopping_rule_samples(p, &g->h->image[image], answer_key_image(g->a, set, image), by,
@@ -85,7 +86,7 @@ void grade_checks_rates(const struct grading *g, int set, const struct rubric_ch
     out->chance = score_chance(&c->count, &count);
 }
 
-/* What a run may take longer or shorter than another of the same work. */
+/* Seconds by which the CPU times of two runs of the same work may differ. */
 static double timing_error(const struct made *m)
 {
     return 0.01 + 0.05 * m->cpu_s;

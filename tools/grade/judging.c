@@ -40,10 +40,10 @@ bool judging_can_buy(const struct judging *w)
     return all;
 }
 
-/* Times the samples, where it is not known how many it takes. */
+/* Factor of samples to ask for where it is not known how many are needed. */
 static const double few = 4;
 
-/* Of the smallest of its runs, which is cut off first. */
+/* Samples a pixel of the smallest run of image k, whose noise reaches the clipping point first. */
 static double least_samples(const struct judging *w, int k)
 {
     const struct submitted_image *s = judging_student(w, k);
@@ -71,8 +71,8 @@ static bool measure_noise(const struct judging *w, int k, const unsigned char *u
     return true;
 }
 
-/* Where some images of a check have several runs, those of the others are taken to vary as kappa
- * says. */
+/* If some images of a check have several runs, the measured variance of the others is modelled by
+ * their kappa. */
 static void model_noise(const struct judging *w, const unsigned char *use, const double *kappa)
 {
     bool any = false;
@@ -131,7 +131,7 @@ bool judging_stopping(const struct judging *w, struct stopping *out, struct err 
     return ok;
 }
 
-/* A program that stops by itself has the noise of the samples that it says it took. */
+/* With adaptive sampling, scales the expected noise to the samples that the rate image states. */
 static void scale_noise(struct submitted_image *s, const double *count, double spp)
 {
     for (size_t i = 0; i < 3 * (size_t)s->width * (size_t)s->height; i++) {

@@ -1,5 +1,5 @@
-/* One check being judged: its images, which of their pixels can be compared, and their noise. For
- * the judges of the kinds of checks alone (grade_checks.c, grade_checks_rates.c). */
+/* One check being judged: its images, their comparable pixels and their noise. Only for the judges
+ * of the kinds of checks (grade_checks.c, grade_checks_rates.c). */
 #ifndef ASSAY_JUDGING_H
 #define ASSAY_JUDGING_H
 
@@ -10,8 +10,8 @@ struct judging {
     const struct grading *g;
     const struct rubric_check *check;
     int set;                           /* of accepted deviations */
-    unsigned char *use;                /* pixels that can be compared; NULL: nobody has asked */
-    struct submitted_image compare[2]; /* what images are held against */
+    unsigned char *use;                /* pixels that can be compared; NULL: not looked for */
+    struct submitted_image compare[2]; /* what images are compared with */
 };
 
 /* Image k of the check: in the rubric; the student's; as it should be (NULL: the rubric gives
@@ -27,16 +27,16 @@ bool judging_masks(const struct judging *w, const struct submitted_image *s, siz
 /* Can more samples be had of all its images? */
 bool judging_can_buy(const struct judging *w);
 
-/* Sets the noise that the student's images should have; comes before all below. */
+/* Sets the noise that the student's images should have; call it before the functions below. */
 NODISCARD bool judging_expect_noise(const struct judging *w, struct err *e);
 
-/* Fills w->use, the pixels that can be compared, and out->noise. Around the clipping point a
- * program that is noisier than ours loses more pixels. If fewer than 30 % would be left, out->more
- * asks for more samples instead. False: our failure, not the submission's. */
+/* Fills w->use, the pixels that can be compared, which the caller frees, and out->noise. Around the
+ * clipping point a program that is noisier than ours loses more pixels. If fewer than 30 % would be
+ * left, out->more asks for more samples instead. False: out of memory. */
 NODISCARD bool judging_find_usable(struct judging *w, struct result *out, struct err *e);
 
-/* What the rule of stopping may do to this program: the range for an adaptive image with as much
- * noise as the student's. Needs w->use. The caller frees with stopping_rule_free(). */
+/* What the stopping rule may do to an adaptive image with as much noise as the student's: the range
+ * of bias and of samples. Needs w->use. The caller frees with stopping_rule_free(). */
 NODISCARD bool judging_stopping(const struct judging *w, struct stopping *out, struct err *e);
 
 /* The judge of checks of kind rates (grade_checks_rates.c). */

@@ -14,7 +14,7 @@ static bool has_word(const char *words, const char *word)
     return false;
 }
 
-/* What may be said of an image, the narrowest first. */
+/* Facts about an image, the most specific first. */
 static const char *const facts[] = {
     "only by uniform directions (-H)",
     "only with adaptive sampling (-a)",
@@ -29,7 +29,7 @@ static const char *const facts[] = {
 };
 enum { NUM_FACTS_HERE = sizeof facts / sizeof *facts };
 
-/* Which of them hold. */
+/* Which facts hold for an image of this scene. */
 static void look(const struct rubric_image *p, const char *scene, bool holds[NUM_FACTS_HERE])
 {
     const bool is[NUM_FACTS_HERE] = {
@@ -47,7 +47,8 @@ static void look(const struct rubric_image *p, const char *scene, bool holds[NUM
     memcpy(holds, is, sizeof is);
 }
 
-/* "" where it cannot be read. The caller frees it. */
+/* The text of the image's scene, which the caller frees; "" if it cannot be read, NULL out of
+ * memory. */
 static char *read_scene(const struct rubric *r, const struct rubric_image *p)
 {
     enum { MOST = 1 << 22 };
@@ -62,7 +63,8 @@ static char *read_scene(const struct rubric *r, const struct rubric_image *p)
 
 enum state { NOT_KNOWN, RIGHT, WRONG };
 
-/* That an adaptive image is right says little: the rule of stopping is biased. */
+/* A right adaptive image proves nothing, as the stopping rule is biased: its state stays
+ * NOT_KNOWN. */
 static void find_states(const struct rubric *r, const struct submitted_images *h,
                         const double *share, enum state *state)
 {

@@ -6,7 +6,7 @@
 
 struct located {
     char text
-        [240]; /* "only in light that bounced off a surface first"; "" where nothing is to be said */
+        [240]; /* "only in light that bounced off a surface first"; "": nothing is known */
     int image; /* that shows it; -1: none */
 };
 

@@ -56,7 +56,8 @@ bool mistake_judge(const struct grading *g, int *set, struct result *result, str
         if (!carried_by_name(g, out->with, &out->found, result, paid, e))
             return false;
     } else {
-        /* The checks have shown that something is wrong: that no bug is likelier than none does not make it right. */
+        /* The checks found something wrong: FINDING_CORRECT only means that no known bug is
+         * likelier than none. */
         if (out->looked && out->found.finding == FINDING_CORRECT)
             snprintf(out->found.gate, sizeof out->found.gate,
                      "no known bug, nor two of them, explains the images");

@@ -11,13 +11,13 @@ struct mistake {
     bool looked;            /* images were compared with the catalogue */
     struct diagnosis found; /* named or not; never FINDING_CORRECT, as points were lost */
     int with;               /* the deviations on top of which */
-    char why[200];          /* there is no diagnosis; "" */
-    struct located located; /* where nothing is named */
+    char why[200];          /* why there is no diagnosis; or "" */
+    struct located located; /* set where no bug is named */
 };
 
-/* result: of all checks as graded with the deviations of *set; points that were lost for a mistake that
- * another part already pays for come back. Where a bug is found on top of other accepted deviations,
- * *set becomes those. Only for programs that lost points. Fails only for reasons of our own, such as
+/* result: all checks, as graded with the deviations of *set; points lost by a mistake that another
+ * part already pays for come back. If a bug is found on top of other accepted deviations, *set
+ * becomes those. Only for programs that lost points. Fails only for reasons of our own, such as
  * memory. */
 NODISCARD bool mistake_judge(const struct grading *g, int *set, struct result *result,
                              struct mistake *out, struct err *e);

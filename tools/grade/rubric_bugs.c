@@ -86,7 +86,7 @@ bool rubric_bugs_observe(const struct grading *g, int set, int image, struct obs
 struct sights {
     int num, bugs;
     struct observation clue[RUBRIC_IMAGES];
-    struct view own[RUBRIC_IMAGES]; /* of counting images; elsewhere effect is NULL */
+    struct view own[RUBRIC_IMAGES]; /* of images with a check of rates; else effect is NULL */
 };
 
 static void forget(struct sights *s)
@@ -99,27 +99,29 @@ static void forget(struct sights *s)
     *s = (struct sights){0};
 }
 
-/* Odds of the way from one batch to all samples, as a logarithm: what the noise of a program is not sure of moves it as much at
- * both ends, where a mean of counts hardly moves. */
+/* Log odds of how far the mean count has come from one batch to all samples. Uncertainty of a
+ * program's noise shifts it about equally everywhere, while the mean count itself saturates at both
+ * ends. */
 static double progress(const struct rubric_image *p, double taken)
 {
     double batch = rubric_option(p, "-a", 0), end = 0.05 * (p->spp - batch);
     return log((fmax(0, taken - batch) + end) / (fmax(0, p->spp - taken) + end));
 }
 
-/* What a rule leads to that is in its range is as likely everywhere there. */
+/* Expected FACT_SAMPLES of a rule: all counts within its range are equally likely, so `seen` is
+ * clamped to it. */
 static void set_samples(const struct rubric_image *p, const struct stopping *s, double seen,
                         double *fact, double *fact_sd)
 {
     static const double ends =
-        4; /* of the range, in standard deviations: 3.3 and several shapes (stopping_rule.c) */
+        4; /* half the range, in standard deviations: 3.3, and more for the shapes (stopping_rule.c) */
     static const double least_sd = 0.1;
     double lo = progress(p, s->least), hi = progress(p, s->most);
     fact[FACT_SAMPLES] = fmin(fmax(seen, lo), hi);
     fact_sd[FACT_SAMPLES] = hypot((hi - lo) / 2 / ends, least_sd);
 }
 
-/* So much of it that its light and noise are not known. */
+/* Is so much of the image clipped that its light and noise are unknown? */
 static bool is_clipped(const struct submitted_image *s)
 {
     static const double most = 0.05;
@@ -129,7 +131,8 @@ static bool is_clipped(const struct submitted_image *s)
     return (double)clipped > most * (double)values;
 }
 
-/* A sum divided by all samples, wherever it stopped: by how much depends on the program's own counts, which it has written. */
+/* Effect of dividing a pixel's sum by all samples wherever it stopped, from the counts in the
+ * program's own rate image. */
 static bool expect_mean_over_all(const struct rubric_image *p, const char *rates,
                                  const struct signature *correct, struct effect *mine,
                                  struct err *e)
@@ -152,8 +155,9 @@ static bool expect_mean_over_all(const struct rubric_image *p, const char *rates
     return true;
 }
 
-/* How many samples are taken says something of the rule of stopping alone, once the program's own light and noise are known:
- * what each rule takes with these replaces what the catalogue's bugs took with ours. */
+/* Given the program's own light and noise, the number of samples depends on its stopping rule
+ * alone: counts that each rule takes with these replace the catalogue's, which were measured with
+ * our light and noise. */
 static bool expect_samples(const struct grading *g, int set, int image, struct sights *s,
                            struct err *e)
 {
@@ -218,8 +222,8 @@ static bool look(const struct grading *g, int set, struct sights *out, struct er
     return true;
 }
 
-/* What the images look like with the set of deviations with which they are likeliest: `first`, or another one, unless `only` or where a
- * single bug explains them with that. */
+/* Diagnoses the images with the set of deviations that makes them likeliest. Tries `first`, and
+ * then the others, unless `only`, or a single bug already explains the images with `first`. */
 static bool likeliest_set(const struct grading *g, int first, bool only,
                           const struct diagnose_options *opt, struct sights *seen,
                           struct diagnosis *found, int *with, struct err *e)
@@ -240,8 +244,8 @@ static bool likeliest_set(const struct grading *g, int first, bool only,
             told ? other.log_likelihood + other.candidate[0].log_likelihood : -INFINITY;
         if (!ok || (k > 0 && !(likelihood > best)))
             continue;
-        /* Other deviations with a bug have to be likelier than these with none: a bug may be such a deviation. Two at once also
-         * than one with these. */
+        /* Another set with a bug has to beat this set without one, as a bug may resemble a
+         * deviation; with two bugs it has to beat this set with one, too. */
         best = told ? likelihood
                     : other.log_likelihood + (opt->pairs ? fmax(0, other.largest_lead) : 0) +
                           diagnose_bound(c, g->alpha);
@@ -266,7 +270,7 @@ bool rubric_bugs_diagnose(const struct grading *g, int set, const char *without,
     if (seen == NULL)
         return err_set(e, "out of memory");
     bool ok = likeliest_set(g, set, false, &opt, seen, found, with, e);
-    /* Two at once: with the deviations of a single one that is told, else with any. */
+    /* Two bugs at once: with the set of the single bug that was named, else with any set. */
     opt.pairs = true;
     ok = ok && likeliest_set(g, *with, found->num_named > 0, &opt, seen, found, with, e);
     forget(seen);
@@ -276,7 +280,8 @@ bool rubric_bugs_diagnose(const struct grading *g, int set, const char *without,
 
 /* ---- the catalogue */
 
-/* What the image of that set is: of counting images the mean is that of as many samples as are taken. */
+/* Signature of the correct image; for images with a check of rates, of a render that stops as the
+ * program is asked to. */
 static bool correct_of(const struct rubric *r, const struct answer *own, int image,
                        struct signature *out, struct err *e)
 {
@@ -284,7 +289,8 @@ static bool correct_of(const struct rubric *r, const struct answer *own, int ima
     return rubric_sight_of_render(r, image, counts, counts ? &own->as_asked : &own->m, out, e);
 }
 
-/* A bug on top of deviations: it changes a cell by the factor by which it changes the right one. */
+/* Effect of a bug on top of deviations: that on the image `from`, scaled in each cell by
+ * to/from. */
 static struct effect *derived(const struct effect *e, const struct signature *from,
                               const struct signature *to)
 {
@@ -303,7 +309,7 @@ static struct effect *derived(const struct effect *e, const struct signature *fr
     return out;
 }
 
-/* The measured set nearest to this one: the last that it contains. */
+/* The set to derive from: the last one with a view that is contained in this one; else 0. */
 static int from_set(const struct rubric *r, const struct rubric_bugs *b, int set, int image)
 {
     int from = 0;

@@ -20,10 +20,11 @@ struct rubric_bugs {
 bool rubric_bugs_sees(const struct rubric *r, int image);
 /* The first set of deviations whose reference is, bit by bit, that of `set`. */
 int rubric_bugs_set(const struct answer_key *a, int set, int image);
-/* May the catalogue have a view of its own for images with these deviations? Yes for none and for a
- * single one that is given by words; other views, and missing ones, are derived. */
+/* May the catalogue have a measured view for images with these deviations? Yes for the empty set
+ * and for a single deviation given by options; other views, and missing ones, are derived. */
 bool rubric_bugs_measures(const struct rubric *r, int set);
-/* Of such a view: its name, and a hash of all that decides the correct image. */
+/* Name of such a view, and a hash of all that decides its correct image. Fails if a file cannot be
+ * read. */
 NODISCARD bool rubric_bugs_key(const struct rubric *r, int set, int image, char name[128],
                                char key[65], struct err *e);
 
@@ -40,8 +41,8 @@ bool rubric_bugs_can_observe(const struct grading *g, int set, int image);
 NODISCARD bool rubric_bugs_observe(const struct grading *g, int set, int image,
                                    struct observation *out, struct err *e);
 
-/* Which bug the images look like, graded with the deviations of `set`, or, if no bug explains them with
- * those, with any other set; *with: that set. found->finding is FINDING_CORRECT where nothing is wrong.
+/* Which bug the images look like with the deviations of `set` or, if no bug explains them with those,
+ * with any other set; *with: the set used. found->finding is FINDING_CORRECT where nothing is wrong.
  * A right program is accused with a probability of at most alpha for each set, if its images are
  * independent (they are not if all have one seed). without: as in struct diagnose_options. */
 NODISCARD bool rubric_bugs_diagnose(const struct grading *g, int set, const char *without,

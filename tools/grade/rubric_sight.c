@@ -10,9 +10,11 @@
 #include <math.h>
 
 const double rubric_sight_masked = 1e6;
-/* How well the mean of noise that is cut off is known where a program is noisier than ours: of the clipping point. */
+/* Standard error of the mean of clipped noise, as a share of the clipping point: a program's noise
+ * differs from ours. */
 static const double clip_error = 0.02;
-/* Share of the pixels of a rate image that stand for no number of batches. */
+/* A rate image is not used if more than this share of its pixels stands for no whole number of
+ * batches. */
 static const double most_odd = 0.05;
 
 static const struct rubric_check *rates_check(const struct rubric *r, int image)
@@ -64,7 +66,7 @@ double rubric_sight_clip(const struct rubric *r)
     struct curve curve;
     struct err ignored;
     double lo, hi;
-    if (!tone_curve_parse(r->curve, &curve, &ignored)) /* looked at with the rubric */
+    if (!tone_curve_parse(r->curve, &curve, &ignored)) /* cannot fail: the rubric was checked */
         return INFINITY;
     tone_curve_bin(&curve, 255, 255, &lo, &hi);
     return lo;
@@ -116,7 +118,7 @@ bool rubric_sight_of_render(const struct rubric *r, int image, bool as_asked,
 
 /* ---- a student's image */
 
-/* What a cell of it says. */
+/* Sums over the pixels of a cell, in one channel. */
 struct seen {
     double sum, square, rounding, tolerance; /* of the differences from the reference */
     bool clipped, masked;
@@ -141,7 +143,8 @@ static void fill_cells(const struct rubric *r, const struct submitted_image *s,
         }
 }
 
-/* The variance of its pixels over that of ours: the median over the cells, as a bug makes pixels of one cell differ too. */
+/* Variance of its pixels over that of ours, at least 1: the median over cells, as a bug also
+ * scatters the pixels of a cell. */
 static double noise_of(const struct signature *s, const struct signature *correct,
                        const struct seen *cells)
 {
@@ -176,7 +179,7 @@ static bool count_samples(const struct rubric *r, int image, const struct answer
     if (!rate_image_read(made->rates, p, rates_check(r, image)->batch, &right->as_asked, &rates,
                          &why)) /* its check has said so */
         return !err_is_of_memory(&why) || err_set(e, "%s", why.msg);
-    if (rates.odd > most_odd * rates.pixels) /* not what it stands for */
+    if (rates.odd > most_odd * rates.pixels) /* its counts are not credible */
         return true;
     s->fact[FACT_SAMPLES] = log(rates.mean / p->spp);
     s->fact_sd[FACT_SAMPLES] = rates.sd;

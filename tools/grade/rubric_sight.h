@@ -15,7 +15,7 @@
 
 /* Radiance of the rubric's brightest code; INFINITY: none. */
 double rubric_sight_clip(const struct rubric *r);
-/* Is the number of an image's samples a fact (a check of rates)? */
+/* Is the image's number of samples a fact, as it has a check of rates? */
 bool rubric_sight_counts(const struct rubric *r, int image);
 
 /* Cells of a render of ours: mean, variance of the mean, n = samples in a cell. as_asked: for images
@@ -25,12 +25,12 @@ NODISCARD bool rubric_sight_of_render(const struct rubric *r, int image, bool as
                                       const struct moments *m, struct signature *out,
                                       struct err *e);
 
-/* The variance of a student's cell that has a masked pixel: it says nothing. */
+/* Variance given to a student's cell with a masked pixel: so large that the cell says nothing. */
 extern const double rubric_sight_masked;
 
-/* Cells of a student's image, which exists. right: the reference, `as_asked` for images whose samples
- * are a fact; correct: its cells. The variance of a program that is noisier than ours (median of the
- * cells) is raised accordingly. */
+/* Cells of a student's image, which has to exist. right: the reference, and `as_asked` for images
+ * whose samples are a fact; correct: its cells. If the program is noisier than ours (median over
+ * the cells), variances are raised accordingly. */
 NODISCARD bool rubric_sight_of_student(const struct rubric *r, int image,
                                        const struct submitted_images *h, const struct answer *right,
                                        const struct signature *correct, struct signature *out,

@@ -24,8 +24,8 @@ double score_width(const struct margin *m, const struct interval *i);
  * most alpha. */
 double score_chance(const struct margin *m, const struct interval *i);
 
-/* The share of the points for so many wrong of num pixels, which are counted without chance. No
- * pixels: none is right. */
+/* The share of the points where `wrong` of `num` pixels are wrong, an exact count. num 0: all are
+ * wrong. */
 double score_pixels(const struct margin *m, double wrong, double num);
 
 #endif

@@ -8,7 +8,7 @@
 enum { REPEATS = 8, SHAPES = 3 };
 static const double uncertain = 3.3; /* standard deviations of ln kappa */
 
-/* By the bugs that keep another rule. */
+/* Names of the catalogue's bugs that follow another rule. */
 static const char *const bug_of[NUM_STOPPING_KINDS] = {
     [STOPS_BY_ONE_SIGMA] = "adaptive_one_sigma", [STOPS_BY_ABSOLUTE] = "adaptive_absolute",
     [STOPS_BY_N] = "adaptive_without_root",      [STOPS_BY_SIGMA] = "adaptive_without_root-whole",
@@ -95,7 +95,8 @@ static void sample_of(const struct moments *m, size_t pixel, double *mean, doubl
     *variance = sd * sd;
 }
 
-/* One tile with one shape and kappa: samples of all its pixels; *bias: relative. */
+/* Simulates a tile with one shape and kappa. Returns the samples of all its pixels; *bias: relative
+ * to its light. */
 static double run_tile(const struct simulation *s, struct rect r, int kind, double kappa,
                        double brighter, double *bias)
 {
@@ -184,7 +185,8 @@ enum stopping_kind stopping_rule_of(const char *bug)
     return STOPS_RIGHTLY;
 }
 
-/* Of each tile: the luminance of s over that of m, both cut off where codes end. */
+/* Luminance of s over that of m in each tile, both clipped at the brightest code; 1 where either is
+ * black. */
 static void light_of(const struct submitted_image *s, const struct moments *m, double *light)
 {
     int columns = s->width / RUBRIC_TILE, tiles = columns * (s->height / RUBRIC_TILE);

@@ -24,11 +24,12 @@ enum stopping_kind {
 };
 
 struct stopping {
-    double least, most; /* samples a pixel on average, over all these */
+    double least, most; /* mean samples a pixel, over all shapes and kappas */
     double *low, *high; /* of each tile: relative bias, low <= 0 <= high; NULL: not asked for */
 };
 
-/* s: the student's, with its expected variance; right: the reference, m: of ours without stopping. False: no memory. */
+/* s: the student's image with its expected variance; right: the reference; m: a render of ours that
+ * does not stop. False: out of memory; else the caller frees *out with stopping_rule_free(). */
 NODISCARD bool stopping_rule_range(const struct rubric_image *p, const struct submitted_image *s,
                                    const struct submitted_image *right, const struct moments *m,
                                    const unsigned char *use, struct stopping *out, struct err *e);
@@ -37,7 +38,8 @@ enum stopping_kind stopping_rule_of(const char *bug);
 
 /* How many samples s takes by each rule, given the light and the noise that it shows, whatever its other
  * mistakes: each tile has its own mean, and kappa compares its variance with ours at the right image. m
- * as above. Fails where too little of the image can be judged. */
+ * as above. Fails only out of memory (where too little can be compared kappa is 1); out[].low and high
+ * stay NULL. */
 NODISCARD bool stopping_rule_samples(const struct rubric_image *p, const struct submitted_image *s,
                                      const struct moments *m,
                                      struct stopping out[NUM_STOPPING_KINDS], struct err *e);

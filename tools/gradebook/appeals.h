@@ -1,6 +1,6 @@
-/* What staff decided themselves: points of a check for one submission, with the reason, in a text file of lines
+/* Decisions of staff: the points of a check for one submission, with the reason, in a text file of lines
  *     ID CHECK POINTS REASON...
- * An ID with blanks stands in double quotes; # begins a line that is not read. */
+ * An ID with blanks stands in double quotes; lines that begin with # are comments. */
 #ifndef ASSAY_APPEALS_H
 #define ASSAY_APPEALS_H
 
@@ -18,17 +18,18 @@ struct appeals {
     int num;
 };
 
-/* Fails with the line on a check that the rubric has not, on points that it does not give, without a reason, on a second line for
- * the same. The caller frees with appeals_free(). */
+/* Fails, with the line's number, on an unknown check, on points that it does not give, on a missing
+ * reason, and on a second decision about one check and ID. The caller frees with appeals_free(). */
 NODISCARD bool appeals_read(const char *path, const struct rubric *r, struct appeals *out,
                             struct err *e);
 void appeals_free(struct appeals *a);
 
-/* Hash of what is decided for a submission; a NULL: of nothing. */
+/* Hash of all decisions about a submission; a NULL: there are none. */
 void appeals_key(const struct appeals *a, const char *id, char key[65]);
 
-/* Into a grade (tools/docs/formats/grades.md): each check decided gets its points and "appeal", the reason; it counts as judged. Points
- * of parts and of all follow. */
+/* Enters the decisions into a grade (tools/docs/formats/grades.md): a check gets the points and, as
+ * "appeal", the reason, and counts as judged; the points of its part and of the whole are updated.
+ * a NULL: none. */
 void appeals_apply(const struct appeals *a, const struct rubric *r, json_t *grade);
 
 #endif

@@ -1,5 +1,5 @@
-/* The class, for staff: whom they have to look at, what changed, who has what, how points are spread, which bugs are common, whose programs are slow, and what
- * looks alike. */
+/* The page of the class, for staff: which submissions need them, what changed, points of each,
+ * their distribution, common bugs, slow programs, the same images and the same noise. */
 #include "student_page.h"
 
 #include "grade_change.h"
@@ -36,7 +36,7 @@ static void histogram(FILE *f, const json_t *grades)
     plot_close(&p);
 }
 
-/* A path of one part for an href. */
+/* A link to ID/FILE, the id percent-encoded. */
 static void link_to(FILE *f, const char *id, const char *file, const char *text)
 {
     fputs("<a href=\"", f);
@@ -65,7 +65,7 @@ static int by_urgency(const void *a, const void *b)
     return x != y ? (x > y) - (x < y) : strcmp(member_or_empty(g, "id"), member_or_empty(h, "id"));
 }
 
-/* What is to be said of one in a word or two. */
+/* Why a submission needs staff, in a word or two. */
 static const char *in_short(const json_t *grade)
 {
     const char *state = grade_state(grade);
@@ -103,7 +103,7 @@ static void bugs_of(FILE *f, const json_t *g)
         html_print(f, "%s%s%s%s", k > 0 ? "; or " : "", member_text(b, "bug"),
                    and[0] != '\0' ? ", and " : "", and);
     }
-    /* Of other deviations than those it was graded with: staff may want to know. */
+    /* Deviations other than those it was graded with: staff may want to know. */
     const char *with = member_or_empty(json_object_get(g, "diagnosis"), "with");
     if (k > 0 && with[0] != '\0' && strcmp(with, member_or_empty(g, "accepted")) != 0)
         html_print(f, " on top of %s", with);
@@ -157,7 +157,7 @@ static void table(FILE *f, json_t *const *sorted, size_t num)
     html_table_close(f);
 }
 
-/* Since the grades before: another rubric, or an appeal. */
+/* What changed since the grades before, by another rubric or an appeal. */
 static void changes(FILE *f, json_t *const *sorted, size_t num)
 {
     size_t changed = 0;
@@ -264,7 +264,8 @@ static void look_alikes(FILE *f, const json_t *grades)
         fputs("</ul>\n", f);
 }
 
-/* Adds to `group` all that are like i, and what they are like; group[k]: 0 not yet seen, else a number from 1 on. */
+/* Puts i, all that are alike to it, and so on, into the group `number`. group[k]: group of k from 1
+ * on; 0: not yet seen. */
 static void join_group(const json_t *grades, size_t i, int number, int *group)
 {
     size_t m;
@@ -316,7 +317,7 @@ static void show_copies(FILE *f, const json_t *grades)
     fputs(any ? "</ul>\n" : "", f);
 }
 
-/* The same, of each other. */
+/* same_noise.h: which submissions have the same noise, in groups. */
 static void show_same_noise(FILE *f, const json_t *grades, int *group)
 {
     int number = 0;

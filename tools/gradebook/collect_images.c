@@ -8,11 +8,11 @@
 #include <string.h>
 #include <unistd.h>
 
-static const double step = 1.35; /* between the samples of two runs, at least */
+static const double step = 1.35; /* less 0.15: the least factor between the samples of two runs */
 enum { MOST_RUNS = 12, MOST_ADAPTIVE = 6 };
 
-/* Seeds of images differ, or their noise would be the same; and they do not depend on what other
- * images a rubric has [FNV-1a]. */
+/* A hash of seed and name [FNV-1a]: images have different seeds, or their noise would be the same,
+ * and a seed does not depend on the rubric's other images. */
 static uint64_t image_seed(uint64_t seed, const char *name)
 {
     uint64_t hash = 14695981039346656037u ^ seed;
@@ -21,7 +21,7 @@ static uint64_t image_seed(uint64_t seed, const char *name)
     return hash % 1000000007u;
 }
 
-/* A reader that lacks descriptors says no more than that it cannot read. */
+/* Are there file descriptors left? A reader that lacks them only says that it cannot read. */
 static bool can_open_more(void)
 {
     enum { MORE = 8 };
@@ -33,7 +33,8 @@ static bool can_open_more(void)
     return num == MORE;
 }
 
-/* `why` says why there is none. Fails only for our own trouble. */
+/* Makes and reads one image; `why` says why there is none, or is "". Fails only for reasons of our
+ * own. */
 static bool make_image(const struct collect *c, const struct rubric_image *p, struct made *made,
                        struct submitted_image *image, char why[400], struct err *e)
 {
@@ -121,7 +122,7 @@ struct purchases {
     double tried[RUBRIC_IMAGES][MOST_RUNS]; /* samples of the runs of an image */
     int num[RUBRIC_IMAGES];
     struct submitted_image first[RUBRIC_IMAGES], last[RUBRIC_IMAGES]; /* of its runs */
-    bool stuck[RUBRIC_IMAGES]; /* no more is to be had of it */
+    bool stuck[RUBRIC_IMAGES]; /* no further run is possible */
 };
 
 static bool was_tried(const double *tried, int num, double spp)
@@ -132,8 +133,8 @@ static bool was_tried(const double *tried, int num, double spp)
     return false;
 }
 
-/* Samples of the next run of an image that needs `more` times those it has; 0: none is to be had. A
- * square where the rubric asks for one: programs that stratify a pixel count on it. */
+/* Samples a pixel of the next run of an image that needs `more` times those it has; 0: no run is
+ * possible. A square where the rubric asks for one, as programs that stratify pixels rely on it. */
 static int next_samples(const struct collect *c, const struct purchases *b,
                         const struct submitted_images *h, int image, double more)
 {
@@ -174,7 +175,8 @@ static double cost_of(const struct submitted_images *h, const struct rubric_imag
     return fmax(0.02, h->made[image].cpu_s) * (rubric_is_adaptive(p) ? 1.5 : (double)spp / p->spp);
 }
 
-/* The image of an undecided check that adds most noise, and by how much it has to have more samples. */
+/* Index of the image that adds most noise to an undecided check; -1: none has further runs. *more:
+ * the factor by which its samples have to grow. */
 static int noisiest(const struct rubric_check *c, const struct result *result,
                     const struct purchases *b, double *more)
 {
@@ -194,7 +196,8 @@ static int noisiest(const struct rubric_check *c, const struct result *result,
     return c->images[most];
 }
 
-/* The cheapest image that mends an undecided check. -1: none is left, or none that can be paid. */
+/* Index of the image with the cheapest next run that an undecided check needs; *spp: its samples.
+ * -1: none is left, or none within the budget. */
 static int cheapest(const struct collect *c, const struct submitted_images *h,
                     const struct result *result, struct purchases *b, int *spp)
 {
@@ -241,7 +244,8 @@ static bool should_vary(const struct submitted_image *s, const unsigned char *us
     return noise > rounding;
 }
 
-/* Mean square of a - b, and the standard deviation of its logarithm; channels that one lamp makes alike count once. */
+/* Mean square of a - b; *sd: standard deviation of its logarithm, with the three channels taken as
+ * fully correlated. */
 static double mean_square(const struct submitted_image *a, const struct submitted_image *b,
                           const unsigned char *use, double *sd)
 {
@@ -257,9 +261,10 @@ static double mean_square(const struct submitted_image *a, const struct submitte
     return sum / num;
 }
 
-/* Of three runs, which have one bias: the squares of their differences should be as 1/s0 + 1/s1 and
- * 1/s1 + 1/s2. False: they do not fall by half of that (in logarithms). Clipping takes noise away
- * from smaller runs: where there is much of it, nothing is known. */
+/* Does noise fall with the samples? Three runs have the same bias, so the mean squares of
+ * successive differences should be as 1/s0 + 1/s1 to 1/s1 + 1/s2. False: surely less than half of
+ * that, in logarithms. Clipping takes noise away from smaller runs: true where there is much of
+ * it. */
 static bool has_fallen(const struct submitted_image *const *run, const unsigned char *use)
 {
     static const double few = 0.005, sure = 4.4; /* standard deviations: 1e-5 */
@@ -273,7 +278,7 @@ static bool has_fallen(const struct submitted_image *const *run, const unsigned 
     return !(expected < 0) || log(d1 / d0) - sure * hypot(sd[0], sd[1]) < expected / 2;
 }
 
-/* The first run, and the one before the next. */
+/* Keeps copies of the first run and of the latest, for has_fallen(). */
 static bool keep_copies(const struct submitted_image *s, const struct submitted_image *more,
                         struct submitted_image *first, struct submitted_image *last, struct err *e)
 {
@@ -286,7 +291,8 @@ static bool keep_copies(const struct submitted_image *s, const struct submitted_
     return ok;
 }
 
-/* What is fit to tell noise by: right is ours. */
+/* Sets the expected variances of both, use[] to the pixels that can be compared, and *right to our
+ * render. */
 static bool prepare(struct submitted_image *s, struct submitted_image *more,
                     const struct moments *m, unsigned char *use, struct submitted_image *right,
                     struct err *e)
@@ -298,7 +304,8 @@ static bool prepare(struct submitted_image *s, struct submitted_image *more,
            submitted_image_from(m, s, right, e);
 }
 
-/* Takes over one more run of an image, or finds that it is none. */
+/* Adds a further run to an image unless its noise is correlated with the last one's; consumes
+ * *more. */
 static bool take_run(const struct collect *c, struct submitted_images *h, int image,
                      struct submitted_image *more, struct purchases *b, struct err *e)
 {

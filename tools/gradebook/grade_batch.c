@@ -46,7 +46,7 @@ static json_t *relative_of(const struct difference *a, const struct rubric_image
     return array;
 }
 
-/* What points are a function of, with the margins. */
+/* The intervals that decide the points, with their margins. */
 static json_t *intervals_of(const struct difference *a, const struct rubric_check *c)
 {
     static const char *const names[] = {"red", "green", "blue", "luminance", "furthest tile"};
@@ -102,7 +102,8 @@ static void tell_provisional(struct result *result)
                     ceil(10 * result->more) / 10);
 }
 
-/* A submission that lost points for what it shows; an image that is not of the student's making looks like no bug. */
+/* Looks for the mistake of a submission that lost points, unless a check is flagged: a copied image
+ * shows no bug. */
 static bool find_mistake(const struct grade_job *job, struct submitted_images *h, int *set,
                          struct result *result, struct mistake *out, struct err *e)
 {
@@ -181,7 +182,7 @@ static bool grade_made(const struct grade_job *job, struct submission *s, const 
     return ok;
 }
 
-/* NULL where there is none to say. */
+/* The command that grades this one submission again; NULL: not known, or out of memory. */
 static json_t *command_of(const struct grade_job *job, const char *path)
 {
     int num = 0;

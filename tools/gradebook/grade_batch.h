@@ -1,4 +1,5 @@
-/* `assay grade`: many submissions by one rubric, each into a directory of its own, whatever they do. */
+/* `assay grade`: grades many submissions by one rubric, each into its own directory, whatever they
+ * do. */
 #ifndef ASSAY_GRADE_BATCH_H
 #define ASSAY_GRADE_BATCH_H
 
@@ -20,21 +21,22 @@ struct grade_job {
         *s; /* submissions, how many at a time, where OUT/ID/grade.json goes, .. */
     const struct rubric_bugs *bugs; /* NULL: bugs are not named */
     const struct appeals *appeals;  /* NULL: none */
-    /* One at a time. */
+    /* Called after each submission, one call at a time; num: how many are done. */
     void (*done)(const struct grade_settings *s, int num, const json_t *grade);
 };
 
-/* OUT/ID/grade.json, and a grade below: tools/docs/formats/grades.md. Texts of programs are in it: whoever shows them has to
- * escape them. */
+/* A grade, below, is the content of OUT/ID/grade.json (tools/docs/formats/grades.md). It holds
+ * texts of programs: whoever shows them has to escape them. */
 
-/* Grades all, `jobs` at a time. A submission that we fail to grade has "trouble"; the others go
- * on. Fails only where nothing can be written. Two submissions of the same id are an error. *grades: a new array, in
- * the order of path. */
+/* Grades all, `jobs` at a time. A submission that we fail to grade has "trouble"; the others go on.
+ * Fails only on an id that is no name or occurs twice, if OUT cannot be made, and out of memory.
+ * *grades: a new array, in the order of job->s->submission. */
 NODISCARD bool grade_batch_run(const struct grade_job *job, json_t **grades, struct err *e);
 
-/* What is made of the grades, without the submissions: of the class, OUT/grades.json, the array, grades.csv, junit.xml and
- * index.html, the page for staff; of each submission, OUT/ID/results.json as Gradescope reads it, index.html, and staff.html with
- * the references (r, a: NULL, none). The pages need no other file to be read. */
+/* Writes what follows from the grades: for the class OUT/grades.json (the array), grades.csv,
+ * junit.xml and index.html (for staff); for each submission OUT/ID/results.json as Gradescope reads
+ * it, index.html, and staff.html, which shows the references (r, a NULL: none). A page needs no
+ * other file to be viewed. */
 NODISCARD bool grade_write(const char *out, const struct rubric *r, const struct answer_key *a,
                            const json_t *grades, struct err *e);
 

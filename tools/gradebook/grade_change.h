@@ -1,4 +1,4 @@
-/* What another rubric, or a decision of staff, changed. */
+/* What changed from an earlier grade, by another rubric or a decision of staff. */
 #ifndef ASSAY_GRADE_CHANGE_H
 #define ASSAY_GRADE_CHANGE_H
 

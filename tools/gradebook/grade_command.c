@@ -20,7 +20,8 @@
 #include <string.h>
 #include <unistd.h>
 
-/* Between DIR, which may be a private one of staff's, and the copy that runs see. */
+/* Copies a compiler cache between --build-cache DIR, which may be private to staff, and the copy
+ * that builds see. */
 static bool copy_cache(const char *from, const char *to, const char *mode, struct err *e)
 {
     const struct process p = {
@@ -31,7 +32,7 @@ static bool copy_cache(const char *from, const char *to, const char *mode, struc
     return fs_make_dirs(to, e) && process_run(&p, NULL, e);
 }
 
-/* Builds the starter code as every submission is built, which then need only compile what differs. */
+/* Builds the starter code as submissions are built, so that they need only compile what differs. */
 static bool fill_cache(const struct grade_settings *s, const struct rubric *r,
                        const struct sandbox *box, struct err *e)
 {
@@ -90,7 +91,7 @@ static void tell(const struct grade_settings *s, int num, const json_t *grade)
     fflush(stdout);
 }
 
-/* How many could not be graded, which is ours to mend; the line is of the first. */
+/* How many submissions we failed to grade; *e: the line of the first. */
 static size_t in_trouble(const json_t *grades, struct err *e)
 {
     size_t num = 0;
@@ -102,7 +103,7 @@ static size_t in_trouble(const json_t *grades, struct err *e)
     return num;
 }
 
-/* How many do. */
+/* How many submissions need staff. */
 static size_t need_staff(const json_t *grades)
 {
     size_t num = 0;
@@ -113,7 +114,8 @@ static size_t need_staff(const json_t *grades)
     return num;
 }
 
-/* Where it may be a slip of the pen: a class may be graded in pieces. */
+/* Warns of appeals for unknown submissions: a typo, perhaps, but a class may also be graded in
+ * pieces. */
 static void warn_of_strangers(const char *file, const struct appeals *a, const json_t *grades)
 {
     for (int i = 0; i < a->num; i++) {
@@ -176,7 +178,7 @@ static int run_batch(const struct grade_settings *s, const struct rubric *r,
     return code;
 }
 
-/* With all that no program may see hidden from it. */
+/* Opens the sandbox, with all hidden that no program may see. */
 static bool open_box(const struct grade_settings *s, const struct rubric *r, const char *cache,
                      const char *pathtracer, struct sandbox *box, struct err *e)
 {
@@ -200,7 +202,7 @@ static int grade(const struct grade_settings *s, const struct rubric *r, int arg
 {
     char pathtracer[PATH_MAX];
     const struct path cache = grade_options_references(s);
-    /* What every image would be said to be unreadable for. */
+    /* Without OpenImageIO every image would be reported as unreadable. */
     if (image_oiio_version(e) == NULL)
         return EXIT_NOT_JUDGED;
     struct answer_key *answers = calloc(1, sizeof *answers);
@@ -240,7 +242,7 @@ static int grade(const struct grade_settings *s, const struct rubric *r, int arg
     return code;
 }
 
-/* Each of its variants. */
+/* Checks the rubric's other variants, too, and says what it holds. */
 static int check_rubric(const struct grade_settings *s, const struct suite *suite, struct rubric *r,
                         struct err *e)
 {

@@ -6,8 +6,9 @@
 
 #include <jansson.h>
 
-/* By the images that were graded, in the form of tools/docs/formats/grades.md ("diagnosis"). "with": name of the deviations on
- * top of which the bug was found. JSON null where there is no image. */
+/* "diagnosis" of a grade (tools/docs/formats/grades.md). "with": name of the deviations on top of
+ * which the bug was found. {"error"} where the diagnosis failed; JSON null where no image was
+ * looked at. A new reference. */
 json_t *grade_diagnose_by_images(const struct rubric_bugs *b, const struct rubric *r,
                                  const struct mistake *m);
 

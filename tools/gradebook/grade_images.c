@@ -121,7 +121,7 @@ static bool show_crop(FILE *f, const struct codes *c, const json_t *tile, const 
     return ok;
 }
 
-/* Beside what was seen: what should be, and by how much they differ where they can be laid one on the other. */
+/* Shows the reference and, if the sizes agree, the difference. */
 static bool show_reference(FILE *f, const struct codes *seen, const struct codes *right,
                            const char *name, struct err *e)
 {

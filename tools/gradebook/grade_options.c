@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-/* The first is the rubric. */
+/* The first word is the rubric, the others are submissions. */
 static bool read_word(void *settings, const char *const v[4], struct err *e)
 {
     struct grade_settings *s = settings;

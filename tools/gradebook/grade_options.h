@@ -8,8 +8,8 @@
 
 struct grade_settings {
     const char *rubric, *out, *pathtracer, *golden, *suite, *references, *build_cache, *before,
-        *appeals;            /* before: out, if nothing else is said; NULL: none */
-    const char **submission; /* num of them, words of the command */
+        *appeals;            /* before: `out` unless given; appeals: NULL none */
+    const char **submission; /* num of them; the texts are argv's */
     int num, jobs, threads, variant;
     uint64_t seed;
     double alpha;
@@ -20,8 +20,9 @@ struct grade_settings {
 struct grade_settings grade_options_default(int argc, struct data_dirs *at);
 /* On top of the defaults. */
 NODISCARD bool grade_options_parse(int argc, char **argv, struct grade_settings *s, struct err *e);
-/* The words that decide a grade: "grade", the options and the rubric, without the submissions, where outputs go, how many at a
- * time and the variant, which the references know: a NULL-terminated array of num words, to free(). NULL out of memory. */
+/* The words that decide a grade: "grade", the options and the rubric, without submissions, --out,
+ * --jobs and the like, and --variant, which is kept with the references. A NULL-terminated array of
+ * *num words, for free(); NULL: out of memory. */
 NODISCARD char **grade_options_words(int argc, char **argv, const struct grade_settings *s,
                                      int *num);
 void grade_options_help(void);
@@ -29,8 +30,8 @@ void grade_options_help(void);
 /* Where references are kept. */
 struct path grade_options_references(const struct grade_settings *s);
 
-/* What they ask for but --help and --slurm; argv: where they were read from. The exit code (results.h); with EXIT_NOT_JUDGED, e has
- * the line. */
+/* Does what the settings ask for, except --help and --slurm. argv: the words that they were read
+ * from. Returns the exit code (results.h); with EXIT_NOT_JUDGED, *e has the line. */
 int grade_command(const struct grade_settings *s, int argc, char **argv, struct err *e);
 
 #endif

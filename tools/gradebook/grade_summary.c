@@ -93,7 +93,7 @@ void grade_summary_parts(FILE *f, const json_t *grade, bool staff)
     fputs("</tbody></table>\n", f);
 }
 
-/* The last lines of what building it said; open where that is all there is to say. */
+/* The last 8 KiB of the build's log, unfolded if the build failed. */
 void grade_summary_build_log(FILE *f, const char *dir, const json_t *grade)
 {
     enum { SHOWN = 8192 };

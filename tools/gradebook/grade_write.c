@@ -1,5 +1,5 @@
-/* Writes the grades of a submission and of a class: JSON, CSV, JUnit, TAP, Gradescope's
- * results.json, and the pages. */
+/* Writes the grades of a submission and of a class: JSON, CSV, JUnit, Gradescope's results.json,
+ * and the pages. */
 #include "grade_batch.h"
 #include "grade_needs.h"
 
@@ -87,7 +87,7 @@ static void describe_whole(const json_t *grade, char *out, size_t size)
     }
 }
 
-/* Of all its runs, one after the other. */
+/* Wall time of the first run of each image, summed. */
 static double execution_time(const json_t *grade)
 {
     double sum = 0;
@@ -228,7 +228,7 @@ static bool write_json(const char *path, json_t *root, struct err *e)
     return ok;
 }
 
-/* Of a class. */
+/* Writes one of class_files to f. */
 static bool write_text(const json_t *grades, const char *name, FILE *f, struct err *e)
 {
     if (strcmp(name, "grades.csv") == 0)
@@ -245,7 +245,8 @@ static bool write_text(const json_t *grades, const char *name, FILE *f, struct e
 static const char *const class_files[] = {"grades.csv", "junit.xml", "index.html", NULL};
 static const char *const pages[] = {"index.html", "staff.html", NULL};
 
-/* One of these. grades: the array, of a class; one grade, of a submission. */
+/* Writes one of these files. grades: the array for a file of the class, one grade for a
+ * submission's page. */
 static bool write_file(const char *out, const struct rubric *r, const struct answer_key *a,
                        const json_t *grades, const char *name, struct err *e)
 {

@@ -160,13 +160,13 @@ static json_t *list_of(json_t *grade, const char *name)
     return list;
 }
 
-/* Of a submission's images so far. */
+/* What a submission's images so far say of the reference's noise in them. */
 struct copy {
     double sum, bound; /* of T */
     int images;
 };
 
-/* image NULL: all together. */
+/* Adds to "copied" if t exceeds the bound. image NULL: all images together. */
 static void add_copied(json_t *grade, const char *image, double t, double bound)
 {
     if (t > bound)
@@ -174,7 +174,8 @@ static void add_copied(json_t *grade, const char *image, double t, double bound)
                               json_pack("{ss*, sf, sf}", "picture", image, "t", t, "bound", bound));
 }
 
-/* What is told of one image, if it cost no points. Images that cannot be read any more are left out; for want of memory none is. */
+/* Tests an image that cost no points for the reference's noise, and makes its noise print. One that
+ * cannot be read any more is left out; fails only out of memory. */
 static bool read_noise(const char *out, const struct rubric *r, const struct answer_key *a, int i,
                        json_t *grade, struct copy *copy, struct noise_print *noise, struct err *e)
 {

@@ -1,5 +1,5 @@
-/* The page of one submission: in one glance where the points went, then what is wrong, then each check that lost some with what was
- * asked, what was seen, where; what is right is folded. */
+/* The page of one submission: what is wrong, where the points went, then each check that lost some,
+ * with what was expected, what was seen and where; checks with all points are folded. */
 #include "student_page.h"
 
 #include "grade_change.h"
@@ -16,7 +16,7 @@ struct page {
     const char *dir;
     const json_t *grade;
     bool staff;
-    const struct rubric *rubric; /* of staff's; NULL: none */
+    const struct rubric *rubric; /* on staff's pages; NULL: none */
     const struct answer_key *answers;
 };
 
@@ -59,7 +59,8 @@ static const json_t *image_of(const json_t *grade, const char *name)
     return member_named(json_object_get(grade, "pictures"), name);
 }
 
-/* With the deviations that it was graded with. NULL: there is none to be shown. */
+/* The image's reference, with the deviations that the submission was graded with; NULL: none is
+ * shown. */
 static const struct moments *reference_of(const struct page *p, const char *name)
 {
     const struct rubric *r = p->rubric;

@@ -1,4 +1,5 @@
-/* Pages of grades, for a student, for staff and of a class, and their plots. One file each, nothing from elsewhere. */
+/* Pages of grades, for a student, for staff and of a class, and their plots. Each is one file that
+ * loads nothing else. */
 #ifndef ASSAY_STUDENT_PAGE_H
 #define ASSAY_STUDENT_PAGE_H
 
@@ -7,8 +8,8 @@
 #include <jansson.h>
 #include <stdio.h>
 
-/* Of one grade.json (grade_batch.h), whose images are in dir/ID: what was lost first. For the student: only checks that are visible
- * now, no references, nothing that is staff's. */
+/* The student's page of one grade (grade_batch.h), whose images are in dir/ID: lost points first;
+ * only visible checks, no references, nothing meant for staff. Fails only out of memory. */
 NODISCARD bool student_page(FILE *f, const char *dir, const json_t *grade, struct err *e);
 
 /* The same for staff: everything, beside the references if rubric and answers are given (NULL: they are not). */
@@ -16,16 +17,19 @@ NODISCARD bool student_page_for_staff(FILE *f, const char *dir, const struct rub
                                       const struct answer_key *a, const json_t *grade,
                                       struct err *e);
 
-/* What a page says first. May a check be seen now? Staff see all. */
+/* Parts of a page (grade_summary.c). May a check be shown now? Staff see all. */
 bool grade_summary_shows(const json_t *check, bool staff);
 
-/* The named bug with what it is called where, or where what is wrong shows; nothing where nothing is. */
+/* The named bug with its place in the assignment, or else where the mistake shows; nothing if
+ * neither is known. */
 void grade_summary_bug(FILE *f, const json_t *grade);
 
-/* A bar for each part, as long as it is worth, and links (#check-NAME) to the checks that lost points. */
+/* A bar for each part, its length in proportion to the points, and links (#check-NAME) to the
+ * checks that lost some. */
 void grade_summary_parts(FILE *f, const json_t *grade, bool staff);
 
-/* The last lines of dir/ID/build_log; unfolded where it could not be built. */
+/* The last 8 KiB of the build's log (grade's "build_log" in dir/ID), unfolded if the build failed;
+ * nothing without a log. */
 void grade_summary_build_log(FILE *f, const char *dir, const json_t *grade);
 
 /* A check's tiles. Red: too bright, blue: too dark, full colour from 50 %; grey: not compared. Of `exact`: the share of
@@ -35,7 +39,7 @@ void grade_plot_difference(FILE *f, const json_t *check, double width, double he
 /* A check's intervals against its margins. Nothing where there are none. */
 void grade_plot_intervals(FILE *f, const json_t *check);
 
-/* Of the whole class, for staff: what needs them first. Fails only out of memory. */
+/* The page of the whole class, for staff: what needs them comes first. Fails only out of memory. */
 NODISCARD bool class_page(FILE *f, const json_t *grades, struct err *e);
 
 #endif

@@ -174,7 +174,7 @@ void html_base64(FILE *f, const void *bytes, size_t size)
     }
 }
 
-/* "sha256-<base64>" of a script's text, as a Content-Security-Policy wants it. */
+/* "sha256-<base64>" of a script's text, for a Content-Security-Policy. */
 static struct number_text script_hash(const char *script)
 {
     struct sha256_ctx ctx;

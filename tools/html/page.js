@@ -1,5 +1,5 @@
-// The viewer of each scene: images in place (keys 1 to 9, 0 side by side) and maps of two of them, one
-// zoom, exposure and pixel for all frames of the scene. Verdicts and numbers are in the page without it.
+// The viewer of a scene: its images in one frame (keys 1 to 9; 0: side by side) and maps of two of them. All
+// frames of a scene share zoom, exposure and marked pixel. Verdicts and numbers are on the page without it.
 
 class Scene {
   constructor(section) {
@@ -59,14 +59,14 @@ class Scene {
     return this.maps.get(key);
   }
 
-  // The map's sentence, made once: it may count pixels.
+  // The map's caption, made once, as it may have to count pixels.
   sentence(kind, claim) {
     const m = this.map(kind, claim);
     if (m.sentence === undefined) m.sentence = mapKinds[kind].says(claim.a.name, claim.b.name, m.value, claim.equal);
     return m.sentence;
   }
 
-  // What a pane is to show.
+  // What a pane draws for a map; null until the numbers are loaded.
   mapSource(kind, claim) {
     if (!this.ready) return null;
     const m = this.map(kind, claim), k = mapKinds[kind];
@@ -155,7 +155,7 @@ class Scene {
     this.redraw();
   }
 
-  // To that factor, the image's point (x, y) staying where it is; up to single pixels.
+  // Zooms to that factor with the image's point (x, y) fixed, at most until 4 pixels fill the longer side.
   zoom(factor, x = this.view.x + this.width / this.view.zoom / 2, y = this.view.y + this.height / this.view.zoom / 2) {
     const most = Math.max(this.width, this.height) / 4, v = this.view;
     const next = Math.min(Math.max(factor, 1), most), keep = v.zoom / next;
@@ -178,7 +178,7 @@ class Scene {
     this.pan(tile.x + tile.side / 2 - this.width / v.zoom / 2 - v.x, tile.y + tile.side / 2 - this.height / v.zoom / 2 - v.y);
   }
 
-  // Keeps the marked pixel in sight.
+  // Pans so that the marked pixel stays in view.
   follow() {
     const v = this.view, w = this.width / v.zoom, h = this.height / v.zoom, p = this.pixel;
     this.pan(Math.min(0, p.x - v.x) + Math.max(0, p.x + 1 - v.x - w), Math.min(0, p.y - v.y) + Math.max(0, p.y + 1 - v.y - h));
@@ -198,7 +198,7 @@ class Scene {
     this.redraw();
   }
 
-  // The tile around a pixel becomes the marked one in all frames; the same again unmarks it.
+  // Marks the tile around a pixel in all frames; picking the marked tile again unmarks it.
   pickTile(x, y) {
     const side = this.claim ? this.claim.tile : 0;
     if (!(side > 0)) return;

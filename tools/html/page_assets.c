@@ -1,6 +1,6 @@
 #include "page_assets.h"
 
-/* The assembler reads the files, so that nothing has to be generated; the parts of the script become one.
+/* The assembler includes the files, so that nothing has to be generated; the scripts are concatenated.
  * Paths are relative to the directory in which the compiler runs: the top of the repository. */
 __asm__(".pushsection .rodata\n"
         ".global page_css, page_js, plot_css\n"

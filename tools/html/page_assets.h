@@ -1,4 +1,4 @@
-/* The page's style sheet and script, as they stand in page.css and page*.js, inside the program. */
+/* The page's style sheet and script (page_plot.css, page.css, page*.js), embedded in the program. */
 #ifndef ASSAY_PAGE_ASSETS_H
 #define ASSAY_PAGE_ASSETS_H
 

@@ -1,4 +1,4 @@
-// What a scene is operated with.
+// The controls of a scene.
 
 // Makes the buttons, frames and captions of a scene, and puts them in place of its list of images.
 function buildControls(scene) {
@@ -10,7 +10,7 @@ function buildControls(scene) {
   };
   scene.shotButtons = ["Side by side", ...scene.shots.map((s) => s.name)].map((name, i) => {
     const b = button(String(i), name, () => scene.show(i, null));
-    // Sweeping over the tabs swaps the images, but never changes the layout by surprise.
+    // Moving the pointer over the tabs swaps images, but only while a single one is shown: the layout never changes.
     b.addEventListener("pointerenter", (e) => {
       if (e.pointerType === "mouse" && scene.shown > 0 && !scene.kind && i > 0) scene.show(i, null);
     });
@@ -99,7 +99,7 @@ function buildMaps(scene, claim) {
     });
 }
 
-// Legend and sentence, when the map is first drawn.
+// Adds a map's legend and caption when it is first drawn.
 function captionMap(scene, claim, kind, figure) {
   if (figure.querySelector("figcaption")) return;
   const k = mapKinds[kind], m = scene.map(kind, claim);

@@ -29,14 +29,14 @@ document.addEventListener("keydown", (e) => {
 
 const loadAll = () => Promise.all(scenes.map((s) => s.load()));
 
-// One scene after the other while nothing else is to be done; what is seen before its turn comes at once.
+// Unpacks one scene after the other while the browser is idle; one that comes into view before its turn, at once.
 const idle = (work) => (window.requestIdleCallback || setTimeout)(work);
 function loadNext(i) {
   if (i < scenes.length) scenes[i].load().then(() => idle(() => loadNext(i + 1)));
 }
 window.addEventListener("load", () => idle(() => loadNext(0)));
 
-// On paper is all of what is unfolded, also what has not been scrolled to.
+// For printing, opens folded details other than evidence, and draws all frames, even those never scrolled to.
 const unfolded = new Set();
 window.addEventListener("beforeprint", () => {
   document.querySelectorAll("details:not(.evidence, [open])").forEach((d) => {

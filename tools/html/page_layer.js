@@ -11,7 +11,7 @@ const POWER = (() => {
 })();
 const pow2 = (n) => POWER[n + 1022];
 const OCTAVE = Array.from({ length: 12 }, (_, i) => Math.round(4096 * 2 ** (i / 12)) / 4096);
-// Of every S: the standard error, and the exponent that belongs to it.
+// For each stored noise code S: its standard error, and the exponent of values stored with it.
 const NOISE = Float64Array.from({ length: 8192 }, (_, s) => (s ? 2 ** ((s - 4096) / 12) : 0));
 const EXPONENT = Int16Array.from({ length: 8192 }, (_, s) => (s ? Math.floor((s - 4096) / 12) - 3 : -128));
 const Q_LIMIT = (1 << 20) - 1;
@@ -27,7 +27,7 @@ function inflate(bytes) {
   return new Response(stream).arrayBuffer().then((b) => new Uint8Array(b));
 }
 
-// How far a difference in the channel before goes over into this one.
+// The factor by which a difference in the channel before carries over into this one.
 function carry(noise, noiseBefore, s, sBefore) {
   if (noise && noiseBefore) {
     const k = noise - noiseBefore, octaves = Math.floor(k / 12);
@@ -36,7 +36,7 @@ function carry(noise, noiseBefore, s, sBefore) {
   return sBefore !== 0 ? s / sBefore : 0;
 }
 
-// {width, height, value: [R, G, B], error: [R, G, B] (0: none), n: one number or one a pixel}
+// Returns {width, height, value: [R, G, B], error: [R, G, B] (0: no noise), n: one number, or one for each pixel}.
 function unpackLayer(raw, width, height, uniformN) {
   const pixels = width * height, slope = raw[0] === 1;
   let at = 1;
@@ -58,7 +58,7 @@ function unpackLayer(raw, width, height, uniformN) {
     error.push(e);
   }
 
-  // The exact numbers are multiples q 2^e with |q| <= 2^20, which single precision holds.
+  // Values are multiples q 2^e with |q| <= 2^20, which single precision holds exactly.
   const value = [], shift = [plane(), plane(), plane()];
   let spatialBefore = null;
   for (let k = 0; k < 3; k++) {

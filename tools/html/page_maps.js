@@ -10,7 +10,7 @@ const LUMINANCE = [0.2126, 0.7152, 0.0722];
 const luminance = (three, i) =>
   LUMINANCE[0] * three[0][i] + LUMINANCE[1] * three[1][i] + LUMINANCE[2] * three[2][i];
 
-// The image's luminance, its standard error for channels that err together, and its mean.
+// The image's luminance, its standard error (channels taken as fully correlated), and its mean.
 function greyOf(layer) {
   if (!layer.grey) {
     const pixels = layer.width * layer.height, value = new Float64Array(pixels), error = new Float64Array(pixels);
@@ -28,7 +28,7 @@ const studentT = (d, error) => (d === 0 ? 0 : Math.min(1e4, Math.max(-1e4, d / e
 
 const countAt = (layer, i) => (typeof layer.n === "number" ? layer.n : layer.n[i]);
 
-// The sum over the square of side 2 r + 1 around each pixel, and how many pixels that has.
+// Sums over the square of side 2 r + 1 around each pixel, cut at the image's border.
 function boxSum(value, width, height, r) {
   const rows = new Float64Array(value.length), out = new Float64Array(value.length);
   for (let y = 0; y < height; y++)
@@ -46,7 +46,7 @@ function boxSum(value, width, height, r) {
   return out;
 }
 
-// How much of each of `from` pixels goes into each of `to`: [first, weights, ..] of every one, weights summing to 1.
+// Weights that resample `from` pixels to `to` by area: for each target [first source pixel, weights that sum to 1].
 function shares(from, to) {
   return Array.from({ length: to }, (_, i) => {
     const begin = i * from / to, end = (i + 1) * from / to, first = Math.floor(begin);
@@ -57,7 +57,7 @@ function shares(from, to) {
   });
 }
 
-// The mean radiance of each of width x height parts of a layer's image, {value}; kept for a few sizes.
+// A layer's radiance averaged down to width x height pixels, as {value}; cached for a few sizes.
 function reduceLayer(layer, width, height) {
   layer.reduced = layer.reduced || new Map();
   const known = layer.reduced.get(width);
@@ -94,7 +94,7 @@ const makeMap = {
     const p = greyOf(a), q = greyOf(b);
     return p.value.map((v, i) => studentT(v - q.value[i], Math.hypot(p.error[i], q.error[i])));
   },
-  // Root of the mean square difference around a pixel less the square that noise alone would leave.
+  // RMS difference over 5 x 5 pixels, less the mean square that noise alone explains; relative as above.
   error(a, b) {
     const p = greyOf(a), q = greyOf(b), floor = 0.05 * q.mean;
     const left = p.value.map((v, i) => (v - q.value[i]) ** 2 - p.error[i] ** 2 - q.error[i] ** 2);
@@ -120,7 +120,7 @@ const makeMap = {
       }
     return out;
   },
-  // Made by the harness; NaN where the page has no room for it.
+  // Computed by the harness; all NaN if the page has no such map.
   flip(a, b, claim) {
     return claim.flip || new Float64Array(a.width * a.height).fill(NaN);
   },
@@ -171,7 +171,7 @@ const mapKinds = {
   },
 };
 
-// The 98th percentile of |v|, rounded up to 1, 2 or 5 times a power of ten, from least to most.
+// [-r, r], r the 98th percentile of |v| rounded up to `least` times 1, 2 or 5 times a power of ten, at least `least`.
 function symmetric(values, least, most) {
   const sorted = Float64Array.from(values, Math.abs).filter(Number.isFinite).sort();
   const p98 = sorted.length ? sorted[Math.ceil(0.98 * sorted.length) - 1] : 0;
@@ -224,8 +224,8 @@ function curveTable(name) {
   return curveTables[name];
 }
 
-// Fills RGBA bytes with radiance times gain through a curve: all of a million pixels within a frame. A pixel
-// is one word, its lowest byte red, as on every machine that browsers run on.
+// Fills RGBA bytes with radiance times gain through a tone curve, by table: a million pixels in less than a frame's
+// time. A pixel is a 32-bit word, red its lowest byte: little-endian, as all machines that run browsers.
 function paintImage(rgba, layer, gain, curve) {
   const table = curveTable(curve), [r, g, b] = layer.value, scale = gain * CURVE_STEPS;
   const words = new Uint32Array(rgba.buffer);

@@ -1,4 +1,4 @@
-// What is read off: the marked pixel and the marked tile, in words and tables.
+// The values of the marked pixel and of the marked tile, as tables and text.
 
 // One row for each image, then one for each pair.
 function readPixel(scene) {
@@ -20,11 +20,12 @@ function readPixel(scene) {
     ...(pairs.length ? [table(row("Luminance", ["difference", "t"], "th"), pairs)] : []));
 }
 
-// Tiles along `size` pixels, and the length of the one that begins at `at`: the last has half a tile or more.
+// The number of tiles along `size` pixels, and the length of the one at `at`: a rest below half a tile goes to the
+// last.
 const tilesAlong = (size, side) => Math.max(1, Math.floor((size + (side >> 1)) / side));
 const tileLength = (at, size, side) => size - at < 1.5 * side ? size - at : side;
 
-// Says what is known of a tile below the claim's list of tiles.
+// Writes a tile's difference, t and p below the claim's list of tiles.
 function readTile(scene, tile, claim) {
   if (!claim.tileReading) return;
   const columns = tilesAlong(scene.width, tile.side), i = tile.y / tile.side * columns + tile.x / tile.side;

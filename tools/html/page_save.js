@@ -1,8 +1,8 @@
-// Beside the numbers of a plot, the plot as a file, and as large as the window.
+// Adds to a plot's CSV link one that saves the plot as SVG, and a button that enlarges it.
 
 const SVG_STYLES = ["fill", "stroke", "stroke-width", "stroke-dasharray", "opacity", "font-size", "font-family", "font-weight"];
 
-// A plot that stands alone, in the page's light colours, for programs that know neither style sheets nor variables.
+// A plot as SVG of its own in the page's light colours, for programs that support neither style sheets nor variables.
 function standAlone(svg) {
   const light = [...document.styleSheets[0].cssRules].find((rule) => rule.selectorText === ":root").style;
   for (const name of light) svg.style.setProperty(name, light.getPropertyValue(name));
@@ -17,7 +17,7 @@ function standAlone(svg) {
   return new XMLSerializer().serializeToString(copy);
 }
 
-// The wheel, + and - look closer, dragging and the arrows move, 0 shows all again.
+// Opens a plot in a dialog: the wheel, + and - zoom, dragging and the arrow keys pan, 0 shows all again.
 function enlarge(svg) {
   const big = svg.cloneNode(true), close = make("button", { type: "button" }, "Close"), box = make("dialog", { className: "large" }, big, close);
   const [x0, y0, w, h] = svg.getAttribute("viewBox").split(/[ ,]+/).map(Number), view = { x: x0, y: y0, zoom: 1 };

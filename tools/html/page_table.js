@@ -1,4 +1,4 @@
-// The table of claims: found, sorted, and each row's evidence unfolded.
+// The table of claims: searching, sorting, and unfolding of each row's evidence.
 
 // What a cell is sorted by: seconds of "1 min 31 s", the number it begins with, or its text.
 function sortKey(cell) {
@@ -33,7 +33,7 @@ function makeSortable(table, before = () => {}) {
   });
 }
 
-// Rows in which every word stands are left.
+// Hides the rows that lack any of the words; returns how many are left.
 function filterRows(table, words) {
   let left = 0;
   for (const r of table.tBodies[0].rows) {
@@ -44,7 +44,8 @@ function filterRows(table, words) {
   return left;
 }
 
-// Rows of one scene that stand together and are as expected fold into the first of them, whose button says how many more there are.
+// Folds adjacent rows of one scene that are as expected into the first, with a button that says how many more there
+// are. Returns a function that opens or folds all of them.
 function foldScenes(table) {
   const groups = [];
   for (const row of table.tBodies[0].rows) {
@@ -89,7 +90,7 @@ if (claims && claims.tBodies[0].rows.length > 1) {
       fold(true, "Unfold all evidence"), fold(false, "Fold all")), count));
 }
 
-// A row's link leads to evidence that is unfolded.
+// Unfolds the evidence that a row's link leads to.
 function unfoldTarget() {
   const target = /^#claim-\d+$/.test(location.hash) ? document.getElementById(location.hash.slice(1)) : null;
   const details = target && target.querySelector("details.evidence");

@@ -1,5 +1,5 @@
-// One frame of the page: a canvas that shows an image or a map through its scene's zoom, with the marked
-// tile and pixel, and hands pointer and keys to the scene.
+// One frame of the page: a canvas that shows an image or a map at its scene's zoom, with the marked tile and
+// pixel, and passes pointer and key events to the scene.
 
 function make(tag, properties, ...children) {
   const element = document.createElement(tag);
@@ -33,7 +33,7 @@ const seen = new IntersectionObserver((entries) => {
 const resized = new ResizeObserver((entries) => entries.forEach((entry) => redraw(entry.target.pane)));
 
 class Pane {
-  // source() says what to show: {id, key, paint(rgba), label}, {.., over} with the wiped-in one, or null.
+  // source() says what to show: {id, key, paint(rgba), label}, also {.., over: the source wiped in}; null: nothing.
   constructor(scene, source) {
     this.scene = scene;
     this.source = source;
@@ -50,8 +50,8 @@ class Pane {
     resized.observe(this.frame);
   }
 
-  // An image of so many pixels, for all frames; painted again only when its key has changed. Fewer than it has: an
-  // image's radiance is averaged before the curve, a map is painted whole and made smaller.
+  // The source painted on a canvas of that size, shared by all frames and repainted only when its key has changed.
+  // Below full size, an image's radiance is averaged before the tone curve; a map is painted whole and scaled down.
   buffer(source, width = this.scene.width, height = this.scene.height) {
     const { buffers } = this.scene, id = source.id + " " + width, whole = width === this.scene.width;
     let b = buffers.get(id);
@@ -85,7 +85,7 @@ class Pane {
     if (source.prepare) source.prepare();
     this.canvas.setAttribute("aria-label", source.label);
     const c = this.canvas.getContext("2d"), scale = width / s.width * v.zoom;
-    const fits = v.zoom === 1 && scale < 1; // then a copy of the frame's size is kept, which nothing scales
+    const fits = v.zoom === 1 && scale < 1; // then a copy of exactly the frame's size is drawn, unscaled
     c.imageSmoothingEnabled = scale < 1;
     const put = (what, x0, x1) => {
       c.save();
@@ -127,7 +127,8 @@ class Pane {
     if (s.pixel) box(s.pixel.x, s.pixel.y, 1, 1, true);
   }
 
-  // Where in the image a pointer event is, in pixels and parts of them.
+  // The position of a pointer event: x, y in image pixels (fractional), share of the frame's width, CSS pixels per
+  // image pixel.
   place(e) {
     const r = this.frame.getBoundingClientRect(), s = this.scene, scale = r.width / s.width * s.view.zoom;
     return { x: s.view.x + (e.clientX - r.left) / scale, y: s.view.y + (e.clientY - r.top) / scale,

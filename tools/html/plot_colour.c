@@ -7,8 +7,8 @@
 
 #include <gsl/gsl_sort.h>
 
-/* The smallest of n > 0 values that at least that fraction of them, in (0, 1], do not exceed. Sorts
- * them. */
+/* Sorts n > 0 values and returns the smallest that at least `fraction` of them, in (0, 1], do not
+ * exceed. */
 static double percentile(double *value, size_t n, double fraction)
 {
     assert(n > 0 && fraction > 0 && fraction <= 1);

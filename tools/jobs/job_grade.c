@@ -14,7 +14,7 @@
 #include <string.h>
 #include <unistd.h>
 
-/* The references are made here and now: all jobs need the same. */
+/* Renders the references while planning, as all jobs need the same. */
 static bool prepare(const struct grade_settings *s, const char *references, int argc, char **argv,
                     struct err *e)
 {
@@ -30,7 +30,7 @@ static bool beside_rubric(struct plan *p, const struct rubric *r, const char *na
     return name[0] == '\0' || plan_input(p, path.s, e);
 }
 
-/* The rubric and what it names. */
+/* Adds the rubric and the files that it names as inputs. */
 static bool rubric_inputs(struct plan *p, const struct grade_settings *s, const char *references,
                           struct err *e)
 {
@@ -74,7 +74,7 @@ static bool plan_jobs(const struct grade_settings *s, int argc, char **argv, str
          plan_input(p, references.s, e) && plan_input(p, s->pathtracer, e) &&
          rubric_inputs(p, s, references.s, e);
     plan_may_end(p, EXIT_INCONCLUSIVE); /* staff have to look */
-    plan_may_end(p, EXIT_NOT_JUDGED);   /* what a node has trouble with, the batch tries again */
+    plan_may_end(p, EXIT_NOT_JUDGED);   /* what fails on a node, gather grades again */
     for (int k = 0; ok && k < s->num; k++)
         ok = plan_job(p, &s->submission[k], 1, (const char *const[]){s->submission[k], NULL}, e);
     free(words);
@@ -98,7 +98,8 @@ bool job_grade_plan(int argc, char **argv, const struct plan_wishes *w, struct p
     return ok;
 }
 
-/* OUT/ID as the job left it, by rename. What a node had trouble with left nothing, and the batch tries it again. */
+/* Copies what a job left to OUT/ID, which appears by rename. A job that could not grade has left nothing; gather
+ * grades that submission again. */
 static bool place(const struct plan *p, int k, const char *out, const char *submission,
                   struct err *e)
 {
@@ -118,7 +119,7 @@ static bool place(const struct plan *p, int k, const char *out, const char *subm
             err_set(e, "%s: cannot appear: %s", to.s, strerror(errno)));
 }
 
-/* Each submission is put where a batch here would have left it; the batch then finds all of them done. */
+/* Puts each result where a batch here would have left it; grade_command() then finds all of them done. */
 int job_grade_gather(const struct plan *p, int argc, char **argv, struct err *e)
 {
     struct data_dirs at;

@@ -1,38 +1,42 @@
-/* What can be planned (plan.h), and what a kind has to say for it. */
+/* The kinds of commands that can be planned (plan.h), and the functions with which they build a plan. */
 #ifndef ASSAY_JOB_KINDS_H
 #define ASSAY_JOB_KINDS_H
 
 #include "renderer/base/cli_rewrite.h"
 #include "plan.h"
 
-/* A plan in the making. Texts are copied; what is no UTF-8 makes it fail at the end. */
+/* Building a plan. Texts are copied; one that is not UTF-8 fails with a line. */
 
-/* What is planned: a kind, with the command argv. */
+/* Begins the head of a plan of that kind, for the command argv. */
 NODISCARD bool plan_head(struct plan *p, const char *kind, int argc, char **argv, struct err *e);
-/* What a kind does first: where the output goes, which fixes plan->dir, what the jobs leave, and their threads. */
+/* To be called first by a kind: the command's output, which fixes p->dir (made here); the file that each job
+ * leaves; the threads of a job. */
 NODISCARD bool plan_begin(struct plan *p, const char *output, const char *product, int cpus,
                           struct err *e);
-/* Words of all jobs, from the program on, which is an input. user: from the user's command, where "{job}" and "{out}" are
- * refused. */
+/* Appends words of the jobs' common command; the first is the program, which becomes an input. user: they are from the
+ * user's command, and "{job}" and "{out}" are refused. */
 NODISCARD bool plan_run_words(struct plan *p, const char *const *word, int num, bool user,
                               struct err *e);
-/* Those of the user's command that the table does not leave out. */
+/* Appends the words of the user's command, without those that the table leaves out. */
 NODISCARD bool plan_user_words(struct plan *p, const struct option_words *leave_out, int num,
                                char **word, struct err *e);
-/* An exit code besides 0. */
+/* Accepts another exit code of jobs besides 0. */
 void plan_may_end(struct plan *p, int code);
-/* A file or directory that all jobs read. */
+/* Adds a file or directory that all jobs read, by its hash. */
 NODISCARD bool plan_input(struct plan *p, const char *path, struct err *e);
-/* What a validation with --live runs: Blender, and the other engines that are in PATH, since not every scene needs them. */
+/* Adds the programs that a validation with --live runs: Blender, and the other engines if they are in PATH, as not
+ * every scene needs them. */
 NODISCARD bool job_reference_live_inputs(struct plan *p, const char *share_dir, struct err *e);
-/* The next job; input: what it alone reads, NULL at the end. After all of the above. */
+/* Adds a job with its words; input: the files that only it reads, NULL at the end. To be called after all of the
+ * above. */
 NODISCARD bool plan_job(struct plan *p, const char *const *word, int num, const char *const *input,
                         struct err *e);
 
-/* Each plans the command (argv[0] its name), and puts it together; the exit code of the command. */
+/* Each pair plans the command (argv[0]: its name), and assembles its output from the jobs, returning the command's exit
+ * code. */
 bool job_render_plan(int argc, char **argv, const struct plan_wishes *w, struct plan *p,
                      struct err *e);
-/* Without naming the images on stdout. */
+/* As job_render_gather(), but does not print the names of the images. */
 NODISCARD bool job_render_gather_quietly(const struct plan *p, int argc, char **argv,
                                          struct err *e);
 int job_render_gather(const struct plan *p, int argc, char **argv, struct err *e);

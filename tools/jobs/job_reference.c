@@ -1,5 +1,5 @@
-/* References as jobs: each renders some images of one of them (replicate_images.h), a replicate of Cycles say; what is there and up
- * to date has none. The plan's head also has
+/* References as jobs: each renders some images of one reference (replicate_images.h), for example replicates of
+ * Cycles; one that is stored and up to date has no job. The plan's head also has
  *   "references": [{"scene": , "engine": , "seed": , "key": reference_key(), "binary_sha256": of the engine,
  *                   "job": of its first images, "jobs": how many}] */
 #include "reference/base/process.h"
@@ -14,7 +14,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* What every job says itself, or what is settled when it is planned. */
+/* Options that each job sets itself, or that planning settles. */
 static const struct option_words not_of_a_job[] = {{"--only", 1},
                                                    {"--engine", 1},
                                                    {"-o", 1},
@@ -37,8 +37,8 @@ static bool add_words(struct plan *p, int argc, char **argv, int threads, struct
            plan_user_words(p, not_of_a_job, argc - 1, argv + 1, e);
 }
 
-/* What an engine is besides its scene: the program, and its scripts in share_dir. *sha256 (may be
- * NULL): of the program, owned by the plan. Fails where it is not in PATH. */
+/* Adds an engine's program and its scripts in share_dir as inputs. *sha256 (may be NULL): that of the
+ * program, owned by the plan. Fails if it is not in PATH. */
 static bool engine_inputs(struct plan *p, const char *engine, const char *share_dir,
                           const char **sha256, struct err *e)
 {
@@ -100,7 +100,7 @@ static bool look_at_one(void *ctx, const struct suite_scene *scene,
     return true;
 }
 
-/* Its share of all jobs, one at least and at most one for each image. */
+/* A reference's share of `parts` jobs, in proportion to its images: at least 1, at most one for each image. */
 static int jobs_of(const struct wanted *w, int parts, int images)
 {
     long long share = ((long long)parts * w->images + images / 2) / images;
@@ -131,13 +131,13 @@ static bool plan_one(struct plan *p, const struct wanted *w, int jobs, const cha
     return ok;
 }
 
-/* Of its engine in the table. */
+/* Index of the reference's engine in engine_table. */
 static ptrdiff_t index_of(const struct wanted *w)
 {
     return engine_kind_of(w->ref->engine) - engine_table;
 }
 
-/* Inputs come before the first job. */
+/* Plans all jobs; inputs have to be added before the first. */
 static bool plan_jobs(struct planning *g, int argc, char **argv, int parts, struct plan *p,
                       struct err *e)
 {
@@ -190,7 +190,7 @@ static const json_t *entry_of(const struct plan *p, const struct suite_scene *sc
     return NULL;
 }
 
-/* The artefacts of jobs first .. first+num-1, whole: an array of paths, then the paths; to free(). */
+/* Paths of the artefacts of jobs first .. first+num-1, after verifying them; one block, to free(). NULL with a line. */
 static const char **artefacts(const struct plan *p, int first, int num, struct err *e)
 {
     if (first < 0 || num < 1 || num > p->num - first) {
@@ -255,7 +255,7 @@ static bool settle_one(void *ctx, const struct suite_scene *scene,
                          scene->name, ref->engine);
 }
 
-/* With --fresh nothing was up to date when it was planned. */
+/* Folds the images of all planned references and writes these; keeps the others, if still up to date. */
 int job_reference_gather(const struct plan *p, int argc, char **argv, struct err *e)
 {
     struct reference_command c;

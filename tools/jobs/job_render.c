@@ -1,6 +1,7 @@
-/* A render as jobs: cells of its image. What a pixel is depends on no other, so cells with all samples of their pixels, put beside
- * each other, are the image of one render bit by bit, whatever the cells. --ranges: each cell in sample ranges, whose
- * sums are added in the order of the samples: bits then depend on the ranges, but on nothing else. */
+/* A render as jobs: cells of its image. No pixel depends on another, so cells with all samples of their pixels,
+ * side by side, are bit by bit the image of one render, however it is cut. --ranges: each cell is also cut into
+ * sample ranges, whose sums are added in the order of the samples; the bits then depend on the ranges, and on
+ * nothing else. */
 #include "renderer/base/cli_rewrite.h"
 #include "renderer/base/fs.h"
 #include "renderer/collada/collada.h"
@@ -11,7 +12,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-/* Every job says these itself. */
+/* Options that each job sets itself. */
 static const struct option_words cells_and_threads[] = {{"-p", 4}, {"--cell", 4}, {0}};
 
 #define PRODUCT "cell.png.state"
@@ -49,8 +50,8 @@ static bool check_options(const struct options *o, struct err *e)
     return true;
 }
 
-/* As near to `parts` as whole rows of cells allow: rows of the image as long as there are enough for 16 each, then
- * columns too. out: x y dx dy, origin at the bottom left. */
+/* Cell k (out: x y dx dy, origin at the bottom left) of *num, about `parts`: strips of at least 16 rows or so,
+ * which are cut into columns, too, if there are too few of them. */
 static void cell_of(const struct options *o, int parts, int k, int *num, int out[4])
 {
     int width = o->cell[2], height = o->cell[3];
@@ -69,7 +70,8 @@ static void cell_of(const struct options *o, int parts, int k, int *num, int out
     out[3] = y1 - y0;
 }
 
-/* ranges: each job says its samples itself. Then -s has to be there, which without one would be the last of them. */
+/* The words of all jobs. ranges: each job has its own --samples; -s must then be given, as it would default to
+ * their end. */
 static bool add_words(struct plan *p, int argc, char **argv, const struct options *o,
                       const char *program, int threads, bool ranges, struct err *e)
 {
@@ -113,7 +115,7 @@ static bool add_job(struct plan *p, const int cell[4], const int *range, struct 
     return plan_job(p, word, range != NULL ? 7 : 5, (const char *const[]){NULL}, e);
 }
 
-/* The images of its textures and what reads them, and the files that it refers to. */
+/* Adds the scene's textures, the module that reads them, and the documents that it refers to, as inputs. */
 static bool add_images(struct plan *p, const struct options *o, struct err *e)
 {
     struct scene s;

@@ -1,4 +1,4 @@
-/* The parts of a render (job_render.c) put together, 16 rows at a time, from the sums of their states. */
+/* Assembles the parts of a render (job_render.c), 16 rows at a time, from the sums in their state files. */
 #include "renderer/base/cli.h"
 #include "renderer/collada/collada.h"
 #include "renderer/base/cli_rewrite.h"
@@ -12,11 +12,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* A part, and its state while its rows are needed. */
+/* What one job rendered, with its state file while rows of it are needed. */
 struct part {
     int x, y, width, height;  /* in the image, origin at the top left */
     int first, last;          /* its samples */
-    struct checkpoint *state; /* NULL: not yet, or no more */
+    struct checkpoint *state; /* NULL: not yet open, or done */
 };
 
 struct gathering {
@@ -25,7 +25,7 @@ struct gathering {
     struct render_id id; /* of the whole */
     struct part *part;
     bool ranges;
-    struct film more; /* ranges: a band of one that is added */
+    struct film more; /* ranges: the band of a range to be added */
     uint32_t
         num_samples; /* the most of any part: pixels of an adaptive one may have stopped before */
 };
@@ -97,8 +97,8 @@ static bool find_parts(struct gathering *g, struct err *e)
     }
     g->ranges = ok && g->part[0].last < o->last;
     g->num_samples = (uint32_t)(o->last - o->first);
-    /* In one piece an adaptive render says how far it went; in ranges each may stop where all its pixels have, so that all of
-     * them have seen all. */
+    /* Without ranges, the states of an adaptive render say how many sample numbers were seen; a range ends early
+     * only once all its pixels have stopped, so that with ranges all of them count as seen. */
     if (!ok || g->ranges || (o->adaptive_batch == 0 && o->pilot_tolerance < 0))
         return ok;
     g->num_samples = 0;
@@ -111,8 +111,8 @@ static bool find_parts(struct gathering *g, struct err *e)
     return ok;
 }
 
-/* Has every pixel of the part, from the band's row y on, the samples that it should? Where the assignment's rule decided, only
- * the samples tell. */
+/* Has every pixel in num rows of the part, from the band's row y on, as many samples as it should? With the
+ * assignment's adaptive rule that number is not known beforehand, and nothing is checked. */
 static bool check_counts(const struct gathering *g, const struct part *part, const struct film *f,
                          int y, int num, struct err *e)
 {
@@ -130,7 +130,8 @@ static bool check_counts(const struct gathering *g, const struct part *part, con
     return true;
 }
 
-/* Onto what the band has of the ranges before, from its row y on. Every range had the same pilot. */
+/* Adds num rows of a range to the band, which has the ranges before it, from its row y on. The pilot's decisions
+ * must be the same in every range. */
 static bool add_rows(struct gathering *g, const struct part *part, struct film *band, int y,
                      int num, struct err *e)
 {
@@ -146,8 +147,8 @@ static bool add_rows(struct gathering *g, const struct part *part, struct film *
     return true;
 }
 
-/* Rows y .. y+num-1 of the image, from all parts that have some of them: those of a cell in the order of their samples, as
- * they were planned. */
+/* Reads rows y .. y+num-1 of the image from all parts that have some of them, the ranges of a cell in the order of
+ * their samples, as planned. */
 static bool read_band(struct gathering *g, int y, int num, struct film *band, struct err *e)
 {
     for (int k = 0; k < g->plan->num; k++) {
@@ -181,7 +182,7 @@ static bool band_alloc(const struct options *o, int height, struct film *f, stru
     return f->target != NULL || err_set(e, "out of memory");
 }
 
-/* All rows by bands into the images; with --keep-state one band is all of it, which must fit into memory. */
+/* Writes the images band by band; with --keep-state in a single band, which must fit into memory. */
 static bool write_whole(struct gathering *g, const struct output *out, struct err *e)
 {
     const struct options *o = g->o;
@@ -211,7 +212,7 @@ static bool write_whole(struct gathering *g, const struct output *out, struct er
     return ok;
 }
 
-/* "0:4,4:9" of the first cell, as of all others, to free(); NULL out of memory. */
+/* The sample ranges of the first cell, which all share: "0:4,4:9", to free(). NULL: out of memory. */
 static char *ranges_text(const struct gathering *g)
 {
     enum { RANGE = 24 };
@@ -234,7 +235,7 @@ bool job_render_gather_quietly(const struct plan *p, int argc, char **argv, stru
     char **word = calloc((size_t)argc + 1, sizeof *word), *ranges = NULL;
     g.part = calloc((size_t)p->num, sizeof *g.part);
     bool ok = (word != NULL && g.part != NULL) || err_set(e, "out of memory");
-    /* As a render here would have been asked for. */
+    /* The command of the same render without Slurm. */
     static const struct option_words slurm[] = {{"--slurm", 1}, {0}};
     if (ok)
         out.argc = cli_rewrite_kept(slurm, argc, argv, word);

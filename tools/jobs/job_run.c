@@ -19,7 +19,7 @@ static json_t *job_of(const struct plan *p, int k)
     return json_loads(p->line[k], 0, NULL);
 }
 
-/* "" where the line is no job. */
+/* The job's key; "" if its line is not a job. */
 static void key_of(const json_t *job, char key[65])
 {
     const char *text = json_string_value(json_object_get(job, "key"));
@@ -73,12 +73,13 @@ static bool check_inputs(json_t *inputs, struct err *e)
     return true;
 }
 
-/* "{job}" and "{out}" filled in; one block of words and a text for each that begins with "{out}". */
+/* The job's command, with "{job}" and "{out}" replaced: one block, to free(). NULL: out of memory, or a path that
+ * is not UTF-8. */
 static char **command_of(const struct plan *p, const json_t *job, const char *out)
 {
     json_t *run = json_object_get(p->head, "run"), *own = json_object_get(job, "words"),
            *all = json_array();
-    int num, failed = 0; /* where the path is no UTF-8 */
+    int num, failed = 0; /* if the path is not UTF-8 */
     json_each(v, run) {
         const char *word = json_string_value(v);
         if (strcmp(word, "{job}") == 0)
@@ -129,7 +130,8 @@ static bool make(const struct plan *p, int k, const json_t *job, const char *key
     return ok;
 }
 
-/* Two that made the same job have made the same: the second goes. */
+/* Renames the artefact into its place. If another process has made the same job meanwhile, ours is removed: it is
+ * the same. */
 static bool put_in_place(const struct plan *p, int k, const char *from, struct err *e)
 {
     const struct path to = job_run_artefact(p, k, NULL);
@@ -162,7 +164,7 @@ bool job_run(const struct plan *p, int k, bool *made, struct err *e)
     bool ok = check_inputs(json_object_get(p->head, "inputs"), e) &&
               check_inputs(json_object_get(job, "inputs"), e) && fs_remove_tree(out.s, e) &&
               fs_make_dirs(out.s, e) && make(p, k, job, key, out.s, e) &&
-              (why.msg[0] == '\0' || fs_remove_tree(path.s, e)) && /* one that is not whole */
+              (why.msg[0] == '\0' || fs_remove_tree(path.s, e)) && /* a damaged artefact */
               put_in_place(p, k, out.s, e);
     if (!ok)
         (void)!fs_remove_tree(out.s, &why);

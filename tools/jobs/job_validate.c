@@ -1,4 +1,5 @@
-/* A validation as jobs: one for each scene, whose claims share their renders, or one for each claim, which renders what it needs. */
+/* A validation as jobs: one for each scene, whose claims share renders, or one for each claim, which renders all it
+ * needs. */
 #include "reference/base/process.h"
 #include "renderer/base/cli_rewrite.h"
 #include "renderer/base/fs.h"
@@ -11,7 +12,7 @@
 #include <string.h>
 #include <unistd.h>
 
-/* What every job says itself. */
+/* Options that each job sets itself. */
 static const struct option_words not_of_a_job[] = {{"--only", 1},
                                                    {"--out", 1},
                                                    {"--reference-seed", 1},
@@ -46,7 +47,7 @@ struct planning {
     char **argv;
 };
 
-/* The words of all jobs with the first, when the number of claims is known. */
+/* Plans a job. The common words are added with the first, when the number of claims is known. */
 static bool plan_part(void *ctx, const struct validate_part *part, struct err *e)
 {
     struct planning *g = ctx;
@@ -112,7 +113,8 @@ bool job_validate_plan(int argc, char **argv, const struct plan_wishes *w, struc
     return ok;
 }
 
-/* What is said of a scene once, though each job of its claims has said it. */
+/* Appends the entries of `more`, except those of the scene of the last entry: with a job for each claim they are
+ * repeated. */
 static void add_new(json_t *all, json_t *more)
 {
     const json_t *last = json_array_get(all, json_array_size(all) - 1);
@@ -124,11 +126,11 @@ static void add_new(json_t *all, json_t *more)
     }
 }
 
-/* The lists of a job's results behind those of the jobs before. */
+/* Appends the lists of a job's results to those of the jobs before, and copies its data/ into out. */
 static bool add_results(const struct plan *p, int k, const char *out, json_t *results,
                         struct err *e)
 {
-    /* Margin and filter are one object each, the same in all. */
+    /* engine_margin and engine_filter are not lists; they are the same in all jobs. */
     static const char *const lists[] = {"claims", "not_expressible", "loader",       "consistency",
                                         "noise",  "engine_margin",   "engine_filter"};
     const struct path path = job_run_artefact(p, k, "results.json"),

@@ -64,7 +64,8 @@ static bool has_layers(const struct share *s)
     return true;
 }
 
-/* Adds the layers of a part of a pixel, with ns samples, to those of nd > 0. Layers 0..5 follow from the moments afterwards. */
+/* Adds the layers of a pixel's part with ns samples to dst, the layers of nd > 0 samples. Layers 0..5 are computed
+ * from the moments afterwards. */
 static void add_layers(float *dst, double nd, const float *src, double ns)
 {
     enum { DEPTH = 6, HITS = 7, NORMAL = 8, OBJECT = 14 };
@@ -76,11 +77,11 @@ static void add_layers(float *dst, double nd, const float *src, double ns)
         dst[i] = (float)((nd * dst[i] + ns * src[i]) / (nd + ns));
 }
 
-/* A part of one of the shares. */
+/* A part of a share, and where it goes. */
 struct piece {
     const struct share *share;
     const struct share_part *part;
-    int kept; /* number of the whole's part that it goes to; -1: those are not kept */
+    int kept; /* index of its part in the whole; -1: the whole keeps no parts */
 };
 
 static int by_samples(const void *pa, const void *pb)
@@ -120,7 +121,8 @@ static bool add_piece(struct share *whole, const struct piece *piece, bool layer
             for (int i = 0; i < values; i++)
                 v[i] = from[piece->part->channel[i]];
             double n = v[9], before = whole->m.n[p];
-            /* Nobody's pixel, in a part of other cells: even one without a sample has an infinite variance. */
+            /* A pixel that this part does not have (its range is of other cells): its own without samples have
+             * variance INFINITY. */
             if (n == 0 && (!layers || v[10] == 0))
                 continue;
             if (layers && before == 0)
@@ -159,7 +161,7 @@ static struct piece *list_pieces(const struct share *share, int num, int *num_pi
     return piece;
 }
 
-/* The whole's own parts, where it has several, and channels for these and the layers. */
+/* Lists the parts of the whole, and allocates channels for them, if there are several, and for the layers. */
 static bool shape_whole(struct share *whole, struct piece *piece, int num, bool layers,
                         struct err *e)
 {
@@ -196,7 +198,7 @@ static bool shape_whole(struct share *whole, struct piece *piece, int num, bool 
     for (int i = 0; !keeps && i < num; i++)
         piece[i].kept = -1;
     if (ok) {
-        /* Without any channel it is there for its attributes. */
+        /* An image without channels is needed for its attributes. */
         name[all] = "none";
         ok = image_alloc(&whole->im, whole->cell[2], whole->cell[3], all > 0 ? (int)all : 1, name,
                          e);
@@ -208,7 +210,7 @@ static bool shape_whole(struct share *whole, struct piece *piece, int num, bool 
     return ok;
 }
 
-/* The ranges of share first .. last-1, which are of one cell and sorted; neighbours joined. */
+/* The sample ranges of shares first .. last-1, which are of one cell: sorted, and adjacent ones joined. */
 static bool join_ranges(const struct share *share, int first, int last, struct share *out,
                         struct err *e)
 {
@@ -239,7 +241,7 @@ static bool join_ranges(const struct share *share, int first, int last, struct s
     return true;
 }
 
-/* Are all cells there, and with the same samples? Fills cell and ranges of the whole. */
+/* Checks that the cells fill a rectangle and have the same samples; fills in cell and ranges of the whole. */
 static bool find_whole(const struct share *share, int num, struct share *whole, struct err *e)
 {
     int x0 = INT_MAX, y0 = INT_MAX, x1 = 0, y1 = 0;

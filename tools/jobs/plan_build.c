@@ -39,7 +39,7 @@ char **plan_words(const json_t *array, int *num)
     return words;
 }
 
-/* A text that jansson would not take; without memory it has ended the program. */
+/* Fails on a text that jansson rejects. It cannot be for lack of memory, which ends the program (json_memory()). */
 static bool refuse(const char *text, struct err *e)
 {
     return err_set(e, "'%s' is no UTF-8 and cannot be planned", text);
@@ -89,7 +89,7 @@ bool plan_begin(struct plan *p, const char *output, const char *product, int cpu
            refuse(output, e);
 }
 
-/* And what assay loads while it runs. */
+/* Adds a program as an input; of assay, also the module that it loads at run time. */
 static bool add_program(struct plan *p, const char *program, struct err *e)
 {
     struct path module;
@@ -124,7 +124,7 @@ bool plan_user_words(struct plan *p, const struct option_words *leave_out, int n
 
 void plan_may_end(struct plan *p, int code)
 {
-    /* Without them plan_make() fails. */
+    /* Without "ends" plan_make() fails. */
     if (json_array_append_new(json_object_get(p->head, "ends"), json_integer(code)) != 0)
         json_object_del(p->head, "ends");
 }
@@ -134,7 +134,7 @@ bool plan_input(struct plan *p, const char *path, struct err *e)
     return add_input(json_object_get(p->head, "inputs"), path, e);
 }
 
-/* What all jobs have in common and their bits depend on. */
+/* Hashes what all jobs have in common and what their bits depend on. */
 static bool hash_common(const struct plan *p, char hex[65])
 {
     json_t *common = json_pack(

@@ -16,7 +16,7 @@ const char *const share_common[NUM_COMMON][2] = {{"assay:version", "version of t
                                                  {"assay:adaptive", "adaptive mode"},
                                                  {"assay:seed", "seed"}};
 
-/* Of one of PART_VALUES. */
+/* Channel name of one of the PART_VALUES. */
 static const char *share_part_channel(int value)
 {
     static const char *const moments[10] = {"R",    "G",    "B",    "M2.R", "M2.G",
@@ -24,7 +24,7 @@ static const char *share_part_channel(int value)
     return value < 10 ? moments[value] : layer_names[value - 10];
 }
 
-/* "A:B,C:D" in order; apart, unless they may overlap, being of different cells. */
+/* Parses "A:B,C:D", in ascending order; apart: they must be disjoint (parts of different cells may overlap). */
 static bool parse_ranges(const char *text, bool apart, const char *path, uint32_t (**range)[2],
                          int *num, struct err *e)
 {
@@ -54,7 +54,7 @@ static bool parse_ranges(const char *text, bool apart, const char *path, uint32_
     return true;
 }
 
-/* The channels of a part: with "A:B." before their names where it is one of several. */
+/* Finds the channels of a part; kept: it is one of several, and their names begin with "A:B.". */
 static bool find_channels(const struct share *s, struct share_part *p, bool kept, struct err *e)
 {
     for (int i = 0; i < PART_VALUES; i++) {
@@ -68,7 +68,7 @@ static bool find_channels(const struct share *s, struct share_part *p, bool kept
     return true;
 }
 
-/* Nothing is believed of parts but what the whole says: their samples are all of its samples, their values those of a file of
+/* Checks the parts against the whole: in every pixel their samples add up to its n, and their values are valid
  * moments. */
 static bool check_parts(const struct share *s, struct err *e)
 {
@@ -152,7 +152,8 @@ void share_part_name(uint32_t first, uint32_t last, int value, char name[64])
              share_part_channel(value));
 }
 
-/* "A:B,C:D" of num ranges, each of them the first two numbers of `stride` bytes; to free(), NULL out of memory. */
+/* "A:B,C:D" of num ranges, each the first two uint32_t of an element of `stride` bytes; to free(). NULL: out of
+ * memory. */
 static char *write_ranges(const void *range, int num, size_t stride)
 {
     enum { RANGE = 24 };

@@ -5,10 +5,10 @@
 #include <stdint.h>
 
 enum { NUM_COMMON = 5 };
-/* What shares have to agree on, by metadata, and what that is to a reader. */
+/* Attributes that shares have to agree on, and what to call them in messages. */
 extern const char *const share_common[NUM_COMMON][2];
 
-/* The channel of one of PART_VALUES, by its name among those of several parts: "0:4.M2.R". */
+/* Channel name of one of the PART_VALUES in an image that keeps several parts: "0:4.M2.R". */
 void share_part_name(uint32_t first, uint32_t last, int value, char name[64]);
 
 #endif

@@ -22,12 +22,12 @@ enum {
     LOOKS_BEFORE_LOST =
         2, /* out of the queue and without artefact: files may take a moment to be seen */
 };
-static const double patience_s = 60; /* with a controller that does not answer */
+static const double patience_s = 60; /* for a controller that does not answer */
 
 struct job {
     bool made, queued;
-    int tries, round, task; /* the last that it is of; round 0: none */
-    int looks;              /* since it left the queue without artefact */
+    int tries, round, task; /* its last round, and its task there; round 0: none */
+    int looks;              /* at artefacts, since it left the queue without one */
 };
 
 struct cluster {
@@ -52,7 +52,7 @@ static bool ask(const struct cluster *c, const char *const *argv, struct path *l
     return process_run(&p, NULL, e);
 }
 
-/* Which jobs a round is of, a line for each task. */
+/* Reads which jobs a round has, a line for each task. False if there is no such round. */
 static bool read_round(struct cluster *c, int round)
 {
     char *line = NULL;
@@ -75,7 +75,7 @@ static bool read_round(struct cluster *c, int round)
     return true;
 }
 
-/* Marks the jobs of tasks that Slurm still knows. */
+/* Marks the jobs whose tasks are still in the queue. */
 static bool look_at_queue(struct cluster *c, struct err *e)
 {
     struct path log;
@@ -113,7 +113,7 @@ static bool look_at_queue(struct cluster *c, struct err *e)
     return true;
 }
 
-/* Listing a directory makes a network's file system ask anew what is in it. */
+/* Marks the jobs that have an artefact. Listing the directory makes a network file system refresh its cache. */
 static void look_at_artefacts(struct cluster *c)
 {
     DIR *d = opendir(fs_path("%s/jobs", c->plan->dir).s);
@@ -151,8 +151,8 @@ static void last_words(const struct cluster *c, const struct job *j, char text[2
         fclose(f);
 }
 
-/* The jobs that are lost, a line of numbers for each task. Neighbours, which often cost alike, go to
- * different tasks. */
+/* Writes the numbers of the lost jobs, a line for each task, and marks them as queued. Neighbouring jobs, whose costs
+ * are often similar, go to different tasks. */
 static bool write_round(struct cluster *c, int lost, int tasks, struct err *e)
 {
     struct out_file out;
@@ -177,7 +177,7 @@ static bool write_round(struct cluster *c, int lost, int tasks, struct err *e)
     return out_commit(&out, e);
 }
 
-/* The next round: an array whose tasks each run the jobs of a line. */
+/* Submits the next round: an array, each task of which runs the jobs of one line. */
 static bool submit(struct cluster *c, int lost, struct err *e)
 {
     char name[64], array[64], cpus[64];
@@ -237,7 +237,7 @@ static void tell(struct cluster *c)
     strcpy(c->said, now);
 }
 
-/* True if somebody wants us to stop. */
+/* Sleeps for some seconds; true if SIGINT or SIGTERM arrived. */
 static bool wait_a_little(const struct cluster *c)
 {
     const struct timespec t = {1 + c->queued / 500, 0};

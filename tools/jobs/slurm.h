@@ -4,12 +4,12 @@
 
 #include "plan.h"
 
-/* Until every job of the plan is made, submits those that are neither made nor in an array in the queue, as an array of at
- * most 1000 tasks, and follows them. Arrays that an earlier, interrupted run submitted are
- * followed, not repeated. DIR/assay-PLAN-R: the jobs of round R, a line for each task; DIR/log/assay-PLAN-R-TASK.txt: what
- * it printed (PLAN: hash of plan.jsonl). One line of progress on stderr where anything changes.
- * Fails with a line if Slurm cannot be asked for a minute, or on a job that came back three times without its artefact. On SIGINT and
- * SIGTERM the arrays are cancelled. */
+/* Makes every job of the plan: submits those that are neither made nor queued, in rounds, each an array of at most
+ * 1000 tasks, and waits for them. Arrays that an earlier, interrupted run submitted are followed, not repeated.
+ * DIR/assay-PLAN-R: the jobs of round R, a line for each task; DIR/log/assay-PLAN-R-TASK.txt: the task's output
+ * (PLAN: hash of plan.jsonl). Prints a line of progress on stderr when anything changes. Fails with a line if Slurm
+ * does not answer for a minute, or if a job has been submitted three times and left no artefact. SIGINT and SIGTERM
+ * cancel the arrays. */
 NODISCARD bool slurm_make(const struct plan *p, struct err *e);
 
 #endif

@@ -54,7 +54,7 @@ void assay_options_init(struct assay_options *options, size_t size)
     memcpy(options, &all, size < sizeof all ? size : sizeof all);
 }
 
-/* Within what the command takes. */
+/* The same ranges as those of the command's options. */
 static bool check_ranges(const struct assay_options *o, struct err *e)
 {
     const struct {
@@ -171,7 +171,7 @@ static bool run(struct assay_comparison *c, const struct assay_side *const side[
         (i < 2 ? c->job.memory : c->job.memory_again)[i % 2] = memory;
     }
     ok = ok && compare_job_run(&c->job, &c->c, e);
-    for (int i = 0; i < 2; i++) { /* what is left points to nothing of the caller's */
+    for (int i = 0; i < 2; i++) { /* what is kept must not point to the caller's data */
         c->job.memory[i] = c->job.memory_again[i] = NULL;
         c->job.again[i] = NULL;
         c->name[i] = ok ? strdup(c->c.path[i]) : NULL;

@@ -14,7 +14,7 @@ static size_t pixels_of(const struct assay_side *s)
     return (size_t)s->width * (size_t)s->height;
 }
 
-/* Value i of the image that begins at `pixels`, as image_file.h has it. */
+/* Value i of the image at `pixels`, on the scale of image_file.h: integers over their maximum. */
 static float value(enum assay_type type, const void *pixels, size_t i)
 {
     switch (type) {

@@ -1,7 +1,7 @@
 #!/bin/bash
-# tools/packaging/deb.sh BUILD VERSION OUT: Debian packages of what BUILD holds: assay (programs, scenes, references, manual), libassay1,
-# libassay-dev, python3-assay. Needs dpkg-dev; dependencies on libraries are those that dpkg-shlibdeps finds. DEBFULLNAME and
-# DEBEMAIL say who makes them, else the last commit.
+# tools/packaging/deb.sh BUILD VERSION OUT: Debian packages of what BUILD holds: assay (programs, scenes, references,
+# manual), libassay1, libassay-dev, python3-assay. Needs dpkg-dev; dependencies on libraries are those that
+# dpkg-shlibdeps finds. The maintainer is DEBFULLNAME <DEBEMAIL>, or else the committer of the last commit.
 set -euo pipefail
 build=$(realpath "${1:?usage: tools/packaging/deb.sh BUILD VERSION OUT}") version=${2:?} out=${3:?}
 mkdir -p "$out"
@@ -26,7 +26,7 @@ rm -r all/usr/lib all/usr/include
 mkdir -p all/usr/share/zsh/vendor-completions
 mv all/usr/share/zsh/site-functions/* all/usr/share/zsh/vendor-completions
 rmdir all/usr/share/zsh/site-functions
-# What is run keeps its bit, what is data does not.
+# Scripts keep the executable bit, data do not.
 find all/usr/share -type f -exec chmod 644 {} +
 find all/usr/share/assay -type f -exec awk 'FNR == 1 && /^#!/ { print FILENAME }' {} + | xargs -r chmod 755
 gzip -9n all/usr/share/man/man1/*

@@ -1,6 +1,7 @@
 #!/bin/bash
-# tools/packaging/manual.sh BUILD OUT: manual pages and completions from what the programs say themselves (--help is made from the table
-# that options are read by): OUT/man1/assay.1 and assay-VERB.1, OUT/bash-completion/assay and pathtracer, OUT/zsh/_assay and _pathtracer.
+# tools/packaging/manual.sh BUILD OUT: makes manual pages and shell completions from the programs' --help (which is
+# printed from the table of options): OUT/man1/assay.1 and assay-VERB.1, OUT/bash-completion/assay and pathtracer,
+# OUT/zsh/_assay and _pathtracer.
 set -euo pipefail
 build=${1:?usage: tools/packaging/manual.sh BUILD OUT} out=${2:?usage: tools/packaging/manual.sh BUILD OUT}
 assay=$build/assay
@@ -46,7 +47,7 @@ while read -r verb what; do
     "$assay" "$verb" --help | man_page "assay-$verb" "$what" >"$out/man1/assay-$verb.1"
 done <<<"$verbs"
 
-# "-o --out x" of the help on stdin: short or -, long, and x where it takes an argument.
+# "-o --out x" for each option of the help on stdin: short name or -, long name, x if it takes an argument.
 options() {
     sed -nE 's/^ {2,6}(-., )?--([a-z0-9-]+)( [A-Z[][^ ]*)?.*/\1|\2|\3/p' | awk -F '|' '{ sub(/, /, "", $1); print ($1 == "" ? "-" : $1), "--" $2, ($3 == "" ? "" : "x") }'
 }

@@ -1,10 +1,11 @@
-# What brings the programs to others: the shared library, the autograder's zip, Debian packages, an installation.
+# Distribution: the shared library, the autograder's zip, Debian packages, installation.
 
 PREFIX   ?= /usr/local
 RUBRIC   ?= tools/rubrics/cs184-3-1.rubric
 DEPS_DEB := dpkg-dev
 
-# libassay.so (tools/library/assay.h): what two images need, compiled so that it may lie anywhere, and called as if it could not.
+# libassay.so (tools/library/assay.h): what comparing images needs, as position-independent code whose functions cannot
+# be interposed.
 LIBRARY_ABI     := 1
 LIBRARY_SOURCES := $(wildcard $(addsuffix /*.c,$(addprefix renderer/,base math image) reference/base reference/suite \
   $(addprefix tools/,images stats compare exact input sequential results html plots report library)) \

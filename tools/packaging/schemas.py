@@ -32,7 +32,7 @@ INTERVAL = re.compile(r"(^|_)(ci|range)$")
 
 
 def schema_of(key, kind, meaning):
-    """Of one key with its type in words."""
+    """The schema of one key, whose type is given in words."""
     may_be_null = kind.endswith(" or null") or re.search(r"\bnull\b", meaning) is not None
     kind = kind.removesuffix(" or null")
     if kind.startswith(("object", "array of `")):
@@ -73,7 +73,7 @@ def tables(page):
 
 
 def properties(header, rows):
-    """{key: schema}, and the keys that are needed."""
+    """{key: schema}, and a list of the required keys."""
     out, needed = {}, []
     for row in rows:
         keys, cell = re.findall(r"`([^`]+)`", row[0]), dict(zip(header, row))
@@ -103,7 +103,7 @@ def results(page):
         if heading == "The whole":
             for key, value in found.items():
                 text = value.get("description", "")
-                (claim if text.startswith(("of a claim", "of --same-program")) else root)[key] = value
+                (claim if text.startswith(("of a claim", "of --same-program", "of --exchangeable")) else root)[key] = value
             root_needed += needed
         elif heading == "A claim":
             claim.update(found)

@@ -53,7 +53,7 @@ static void write_tick(const struct plot *p, bool is_x, double v)
     html_print(p->f, "%s</text>", a->unit);
 }
 
-/* Of a logarithmic axis at 1, 2, 5 times powers of ten, or only at these where more than two decades are shown. */
+/* The numbers of an axis; of a logarithmic one 1, 2 and 5 times powers of ten, or, over 2.2 decades, these alone. */
 static void write_ticks(const struct plot *p, bool is_x)
 {
     static const double digit[] = {1, 2, 5};

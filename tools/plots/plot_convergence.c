@@ -14,7 +14,7 @@ static double rung_x(const json_t *engine, const json_t *rung, bool against_time
     return against_time ? fmax(0, spp * member_number(engine, "cpu_s_per_spp")) : spp;
 }
 
-/* The ends of both axes: 6 % beyond all rungs. False without two different x. */
+/* The ends of both axes: 6 % beyond all rungs. False if no rung has a point on logarithmic axes. */
 static bool find_ends(const json_t *engines, bool against_time, struct plot *p)
 {
     double x0 = INFINITY, x1 = -INFINITY, y0 = INFINITY, y1 = -INFINITY;

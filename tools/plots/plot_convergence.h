@@ -6,10 +6,11 @@
 #include <stdbool.h>
 #include <stdio.h>
 
-/* <figure> of one element of "convergence" (convergence_results.h), both axes logarithmic; nothing without two different x. */
+/* Writes a <figure> of one element of "convergence" (convergence_results.h), both axes logarithmic; nothing if no
+ * rung has a positive x and error. */
 void plot_convergence(FILE *f, const json_t *scene, bool against_time);
 
-/* <figure> of "depths" of that element, or its error; nothing without any (NULL). */
+/* Writes a <figure> of the element's "depths", or its error; nothing if depths is NULL. */
 void plot_depths(FILE *f, const json_t *depths);
 
 #endif

@@ -1,4 +1,4 @@
-/* Plot of convergence: mean radiance against the greatest number of bounces. */
+/* Plot of the depth ladder: mean radiance against the greatest number of bounces. */
 #include "plot.h"
 #include "plot_convergence.h"
 
@@ -52,7 +52,7 @@ static void write_caption(FILE *f, const json_t *depths)
         if (json_object_get(g, "truth") == NULL)
             continue;
         double d = member_number(g, "mean") - member_number(g, "truth");
-        /* Single precision, as everywhere (tools/docs/background/verdict.md, 1). */
+        /* With the tolerance for float32 of all comparisons (tools/docs/background/verdict.md, 1). */
         double se = member_number(g, "se") + 1e-5 * member_number(g, "truth");
         largest = fmax(largest, se > 0 ? fabs(d) / se : 0);
         known++;

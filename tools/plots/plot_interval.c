@@ -15,7 +15,7 @@ void plot_interval(FILE *f, const json_t *claim)
 {
     double d = member_number(claim, "difference"), lo = member_end(claim, "ci", 0),
            hi = member_end(claim, "ci", 1), margin = member_number(claim, "margin_global");
-    /* All of the interval if it is no wider than 3 margins; otherwise the margin must stay visible. */
+    /* All of the interval if it reaches no further than 3 margins; else the margin must stay visible. */
     double reach = fmax(fabs(lo), fabs(hi));
     double range = margin > 0 ? fmin(fmax(reach, margin) * 1.15, 3 * margin) : reach * 1.15;
     if (!(range > 0))

@@ -1,4 +1,4 @@
-/* The report's drawings, as inline SVG coloured by the page's style sheet. */
+/* A claim's interval and the p-values of its tiles, as inline SVG coloured by the page's style sheet. */
 #ifndef ASSAY_PLOT_INTERVAL_H
 #define ASSAY_PLOT_INTERVAL_H
 
@@ -9,7 +9,7 @@
  * for the interval, a dot for the estimate. What lies outside the drawing ends in an arrow head. */
 void plot_interval(FILE *f, const json_t *claim);
 
-/* What plot_p_values() drew. */
+/* A histogram of the p-values of a claim's tiles. */
 struct p_histogram {
     int num_tiles; /* with a p-value */
     int bins;
@@ -18,7 +18,8 @@ struct p_histogram {
     int below_5_percent;     /* tiles with p < 0.05 */
 };
 
-/* Counts the claim's tile_log10_p into equal bins of p (num_tiles may be 0: then the rest is 0). */
+/* Bins the p-values of the claim's tiles (tile_log10_p); with num_tiles 0 the rest is 0, too. plot_p_values() draws
+ * them and needs at least one. */
 struct p_histogram plot_p_histogram(const json_t *claim, int count[20]);
 void plot_p_values(FILE *f, const struct p_histogram *h, const int count[20]);
 

@@ -13,8 +13,8 @@
 #include <gsl/gsl_cdf.h>
 #include <gsl/gsl_sort.h>
 
-/* The x at which Beta(i, n + 1 - i) reaches that probability. GSL's own inverse does not converge for some of
- * a few thousand tiles. */
+/* The quantile of Beta(i, n + 1 - i), by bisection: for a few thousand tiles GSL's own inverse does not converge
+ * at some i. */
 static double beta_quantile(double probability, int i, int n)
 {
     double low = 0, high = 1;
@@ -34,13 +34,13 @@ void plot_qq_band(int i, int n, double *low, double *high)
     *high = beta_quantile(0.975, i, n);
 }
 
-/* -log10 of the i-th smallest p of n, where uniform ones would have it. */
+/* -log10 of the expected i-th smallest of n uniform p-values. */
 static double qq_expected(int i, int n)
 {
     return -log10(i / (n + 1.0));
 }
 
-/* Every tile while there are few, then ever fewer of those with large p, which lie on each other. */
+/* The point to draw after i: every one of up to 100, else fewer and fewer of those with large p, which overlap. */
 static int next_shown(int i, int n)
 {
     return i + 1 + (n > 100 ? i / 50 : 0);
@@ -89,7 +89,7 @@ bool plot_qq(FILE *f, const json_t *claim, struct err *e)
             v[n++] = fmin(json_number_value(json_array_get(list, i)), 0);
     if (n >= 4) {
         gsl_sort(v, 1, (size_t)n);
-        /* What is far out must not flatten the rest. */
+        /* The y axis is cut so that outliers do not flatten the rest. */
         double chance = -log10(1 / (n + 1.0)), right = 1.05 * chance;
         struct plot p = plot_sized(f, 300, 200);
         p.x = (struct plot_axis){.label = "expected −log₁₀ p", .hi = right};
@@ -128,7 +128,7 @@ struct power power_of(const json_t *claim)
         if (strcmp(member_text(s, "name"), "image") == 0 && tests > 0 && level > 0)
             p.critical = gsl_cdf_ugaussian_Qinv(level / 2);
     }
-    /* Beyond 10 no test covers the image (1e6). */
+    /* An MDB of 10 or more: no test covers the image (region_mdb_none). */
     if (p.critical > 0 && mdb > p.margin && mdb < 10)
         p.error = (mdb - p.margin) / (p.critical + gsl_cdf_ugaussian_Qinv(0.05));
     return p;
@@ -139,7 +139,7 @@ double power_at(const struct power *p, double bias)
     return gsl_cdf_ugaussian_P((fabs(bias) - p->margin) / p->error - p->critical);
 }
 
-/* Where the curve is drawn: the ends, and between them 4 standard errors around where it rises. */
+/* The abscissae of the curve: both ends, and points within 4 standard errors of its rise. */
 enum { RISE = 24, POINTS = RISE + 3 };
 static int curve_points(const struct power *p, double top, double bias[POINTS])
 {
@@ -173,7 +173,7 @@ void plot_power(FILE *f, const json_t *claim)
     for (int i = 0; i < num; i++)
         plot_path_to(&plot, 100 * bias[i], 100 * power_at(&p, bias[i]));
     plot_path_close(&plot, false);
-    for (int i = 0; i < num; i++) /* where it can be pointed at */
+    for (int i = 0; i < num; i++) /* invisible bars with tooltips */
         plot_bar(&plot, "hover", 100 * (i > 0 ? bias[i - 1] + bias[i] : 0) / 2, 0,
                  100 * (i + 1 < num ? bias[i] + bias[i + 1] : 2 * top) / 2, 100, "bias %s: %.3g %%",
                  html_percent_plain(bias[i]).s, 100 * power_at(&p, bias[i]));

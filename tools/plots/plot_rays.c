@@ -11,7 +11,7 @@
 
 struct bar {
     const char *scene;              /* borrowed */
-    double rays, boxes, primitives; /* tests of a ray */
+    double rays, boxes, primitives; /* boxes, primitives: tests per ray */
 };
 
 static int most_first(const void *a, const void *b)

@@ -1,4 +1,4 @@
-/* The report's plot of what a ray costs. */
+/* The report's plot of intersection tests per ray. */
 #ifndef ASSAY_PLOT_RAYS_H
 #define ASSAY_PLOT_RAYS_H
 
@@ -7,8 +7,8 @@
 #include <jansson.h>
 #include <stdio.h>
 
-/* <section> with a bar for each scene of which a claim has "rays_a" (results.h), most tests first: box and primitive tests
- * of a ray, of the first such claim. Nothing where none has. Fails only out of memory. */
+/* Writes a <section> with a bar for each scene with a claim that has "rays_a" (results.md), most tests first: box and
+ * primitive tests per ray of its first such claim. Nothing if there is none. Fails only if out of memory. */
 NODISCARD bool plot_rays(FILE *f, const json_t *claims, struct err *e);
 
 #endif

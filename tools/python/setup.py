@@ -1,4 +1,4 @@
-"""The package with the library in it, built by the project's Makefile: pip install --no-build-isolation tools/python"""
+"""The Python package with libassay, built by the project's Makefile: pip install --no-build-isolation tools/python"""
 
 import shutil
 import subprocess
@@ -21,7 +21,7 @@ class Build(build_py):
 
 
 class Binary(Distribution):
-    def has_ext_modules(self):  # not for every machine
+    def has_ext_modules(self):  # the wheel is platform-specific
         return True
 
 
@@ -34,6 +34,6 @@ setup(
     python_requires=">=3.9",
     cmdclass={"build_py": Build},
     distclass=Binary,
-    # Nothing beside the sources.
+    # Keep build products out of the sources.
     options={"build": {"build_base": str(made / "python")}, "egg_info": {"egg_base": str(made / "python")}},
 )

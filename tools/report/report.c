@@ -37,7 +37,7 @@ static void write_claim_list(FILE *f, const json_t *claims, const struct claim_r
     fputs("</ul>\n", f);
 }
 
-/* Of two files, of which nobody said beforehand what should come out. */
+/* Is the page that of one comparison of two files, for which no verdict was expected beforehand? */
 static bool is_comparison(const struct claim_ref *claim, size_t num)
 {
     return num == 1 && strcmp(member_text(claim->json, "scene"), "files") == 0;
@@ -54,7 +54,7 @@ static void write_comparison(FILE *f, const struct claim_ref *claim)
                member_text(c, "verdict"), member_text(c, "reason"));
 }
 
-/* claim is sorted: not judged, wrong, as expected. left: how many are still to be judged. */
+/* The headline of the claims, which are sorted worst outcome first. */
 static void write_verdict(FILE *f, const json_t *root, const struct claim_ref *claim, size_t num)
 {
     static const char *const what[] = {
@@ -162,8 +162,8 @@ static void write_header(FILE *f, const json_t *root, const struct claim_ref *cl
                member_text(root, "command"));
 }
 
-/* All claims of claim[0]'s scene to the front, in their order; returns how many. The scenes thus
- * keep the order in which the sorted claims first name them. */
+/* Moves all claims of claim[0]'s scene to the front, in their order, and returns how many there are.
+ * Scenes thus keep the order in which the sorted claims first name them. */
 static size_t gather_scene(struct claim_ref *claim, size_t num)
 {
     size_t front = 1;
@@ -207,7 +207,7 @@ static void write_keys(FILE *f)
         f);
 }
 
-/* On a page of more claims the evidence of those as expected is folded. */
+/* With more claims than this, the evidence of those that came out as expected is folded. */
 enum { FOLD_FROM = 8 };
 
 static bool write_page(struct page *p, const json_t *root, struct claim_ref *claim, size_t num,
@@ -266,7 +266,7 @@ bool report_write(const char *results_path, const char *out_path, struct err *e)
     return report_write_with(results_path, NULL, out_path, e);
 }
 
-/* Of checked results. */
+/* Writes the page of results that results_read() has checked. */
 static bool write_file(struct page *page, const json_t *root, const char *path, struct err *e)
 {
     struct results_walk w = {.results = root};

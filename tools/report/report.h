@@ -7,8 +7,8 @@
 /* Reads results_path and the files it names, writes out_path (by rename, with its directories). */
 NODISCARD bool report_write(const char *results_path, const char *out_path, struct err *e);
 
-/* The same with the "convergence" of another results.json (NULL: none), after the scenes. Fails if both
- * files have some. */
+/* The same with the "convergence" of another results.json (NULL: none), after the scenes. Fails if that has none,
+ * or if both have one. */
 NODISCARD bool report_write_with(const char *results_path, const char *converge_path,
                                  const char *out_path, struct err *e);
 

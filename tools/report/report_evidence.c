@@ -172,7 +172,7 @@ static void write_statistic(FILE *f, const json_t *s, double alpha)
     fputs("<td class=\"num\">", f);
     html_p_value(f, log10_p);
     fprintf(f, "</td><td>%s</td><td>", rejects ? "<strong>DIFFERENT</strong>" : "nothing");
-    if (log10_p < 0) /* else nothing stands out, and its place is none */
+    if (log10_p < 0) /* else nothing stands out, and there is no place to name */
         html_text(f, member_text(s, "what"));
     fputs("</td></tr>\n", f);
 }
@@ -187,7 +187,7 @@ static void write_hint(FILE *f, const json_t *h)
             100 * member_number(h, "removed"));
 }
 
-/* With what part of alpha each looked, and what it found; what the difference looks like, and how the noise of both compares. */
+/* The share of alpha of each statistic and what it found; what the difference resembles; the ratio of the variances. */
 static void write_statistics(FILE *f, const json_t *claim)
 {
     const json_t *all = json_object_get(claim, "statistics");
@@ -216,7 +216,7 @@ static void write_statistics(FILE *f, const json_t *claim)
     fputs("</p>\n", f);
 }
 
-/* Of a stored reference (it has seeds): how to replace it. */
+/* How to replace the reference, if it is a stored one (which has seeds). */
 static void write_approval(FILE *f, const json_t *claim)
 {
     if (json_object_get(claim, "seeds_b") == NULL)
@@ -257,7 +257,7 @@ struct tile {
     double log10_p;
 };
 
-/* Puts one that comes after all in `tile` among the SHOWN smallest, in their order. */
+/* Inserts `one` into the sorted list of the SHOWN smallest p after equal ones; num: how many were inserted before. */
 static void keep_smallest(struct tile tile[SHOWN], size_t num, struct tile one)
 {
     size_t i = num < SHOWN ? num : SHOWN;

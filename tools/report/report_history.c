@@ -10,7 +10,7 @@
 #include <math.h>
 #include <string.h>
 
-/* The quantities that are drawn against the runs. */
+/* The quantities that are plotted against the runs. */
 enum quantity { DIFFERENCE, VARIANCE, SECONDS, EFFICIENCY, NUM_QUANTITIES };
 static const char *const quantity_name[NUM_QUANTITIES] = {"difference, %", "variance ratio",
                                                           "time, s", "efficiency, paths/s"};
@@ -90,7 +90,7 @@ static void write_series(FILE *f, const struct history *h, const struct history_
     bool moved = fabs(s->z) > h->critical, mean = strcmp(s->quantity, "mean") == 0;
     fprintf(f, "<tr%s><td>%s</td>", moved ? " class=\"bad\"" : "",
             moved ? "<span class=\"badge bad\">✗ moved</span>" : "");
-    /* To a hundredth, as rounding alone is no move; + 0.0: no minus sign at 0. */
+    /* Rounded to hundredths, so that rounding errors do not show; + 0.0 turns -0 into 0. */
     double z = rint(100 * s->z) / 100 + 0.0;
     html_print(f,
                "<th scope=\"row\">%s</th><td class=\"name\">%s</td><td class=\"name\">%s%s%s</td>"
@@ -102,7 +102,7 @@ static void write_series(FILE *f, const struct history *h, const struct history_
     fputs("</tr>\n", f);
 }
 
-/* A table of all points of hundreds of runs would be most of the page: those of the last runs go into it. */
+/* Rows of the CSV at most: with hundreds of runs it would be most of the page, so only the last runs go into it. */
 enum { MOST_ROWS = 4000 };
 
 static void write_csv(FILE *f, const struct history *h)

@@ -43,7 +43,7 @@ static bool is_of(const struct claim_ref *c, const char *program)
     return strcmp(member_text(c->json, "a"), program) == 0;
 }
 
-/* 8-bit sRGB of box means, at most THUMBNAIL pixels wide and high; NULL without memory. */
+/* 8-bit sRGB of box means, at most THUMBNAIL pixels wide and high, to free(); NULL if out of memory. */
 static uint8_t *shrink(const struct moments *m, int *width, int *height)
 {
     const int most = m->width > m->height ? m->width : m->height,

@@ -1,10 +1,10 @@
-/* The page's section on noise: variance of a sample, and its fall. */
+/* The page's section on noise: variance of a sample, slope of the error, efficiency. */
 #include "report_internal.h"
 
 #include "tools/html/html.h"
 #include "tools/results/noise_results.h"
 
-/* Judged, and as they should be. */
+/* The number of judged rows; good: only of those as expected. */
 static size_t count(const json_t *noise, bool good)
 {
     size_t n = 0;

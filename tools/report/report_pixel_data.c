@@ -8,8 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The page of a suite stays below 3 MB: what is left after the text goes to the numbers behind the
- * images. The page of one scene has them whatever their size. */
+/* A page of several scenes stays below 3 MB: the numbers of images and maps get what the text leaves.
+ * The page of one scene has them whatever their size. */
 enum { PAGE_LIMIT = 3000000, PAGE_RESERVE = 100000 };
 
 bool report_pixel_data_add(struct page *p, const char *path, const struct moments *m, size_t *index,
@@ -38,7 +38,7 @@ bool report_pixel_data_add(struct page *p, const char *path, const struct moment
     return true;
 }
 
-/* The end of an element's tag, and what it holds. */
+/* Ends a <script> tag and writes its content as base64. */
 static void write_bytes(FILE *f, const void *bytes, size_t size)
 {
     fputs("\">", f);
@@ -58,7 +58,7 @@ static void write_colours(FILE *f)
     write_bytes(f, colour, sizeof colour);
 }
 
-/* Whether that many bytes, as base64, may still go into the page. */
+/* Has the page room for that many bytes as base64? */
 static bool has_room(const struct page *p, size_t size)
 {
     long here = ftell(p->f);

@@ -50,7 +50,7 @@ static bool load_shot(struct page *p, struct scene *s, const json_t *claim, cons
     return report_pixel_data_add(p, path.s, &shot->m, &shot->layer, e);
 }
 
-/* Ours first, then the references in the order that the keys 1, 2, .. have in every scene, then others. */
+/* The order of images, so that keys 1, 2, .. mean the same in every scene: ours, the references, the rest. */
 static int rank_of(const struct shot *s)
 {
     static const char *const order[] = {"pathtracer", ENGINES_WITH_GOLDENS(ENGINE_WORD) "truth",
@@ -142,7 +142,7 @@ static void print_observations(FILE *f, const struct moments *m)
         fprintf(f, "%.0f replicates", n);
 }
 
-/* What the page's script makes a viewer of. */
+/* The list of images that the page's script replaces by a viewer. */
 static void write_images(struct page *p, const struct scene *s)
 {
     const struct moments *m = &s->shot[0].m;

@@ -46,7 +46,7 @@ static bool measure_idiff(const struct moments *a, const struct moments *b, doub
     return true;
 }
 
-/* As flip_exposures() has it. */
+/* No pixel has a positive luminance: flip_exposures() fails. */
 static bool is_black(const struct moments *m)
 {
     for (size_t i = 0; i < (size_t)m->width * (size_t)m->height; i++)

@@ -41,7 +41,7 @@ static void write_cell(FILE *f, const struct column *column, const struct claim_
         fputs("</a></th>", f);
         return;
     }
-    /* The heading stands in a cell too, for where a claim is a card. */
+    /* Cells repeat the heading, for narrow windows, where each claim is shown as a card. */
     if (column->kind == COLUMN_VERDICT || column->kind == COLUMN_PLOT)
         fputs("<td>", f);
     else

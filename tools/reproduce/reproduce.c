@@ -15,7 +15,7 @@ void reproduced_free(struct reproduced *r)
     *r = (struct reproduced){0};
 }
 
-/* Told from an EXR by its first byte. */
+/* Is the file JSON, to judge by its first byte, rather than an EXR? */
 static bool is_results(const char *path, bool *is, struct err *e)
 {
     FILE *f = fs_open(path);
@@ -52,6 +52,6 @@ bool reproduce(const char *path, const struct reproduce_options *opt, struct rep
     if (!ok)
         reproduced_free(out);
     bool removed = temp_dir_close(&dir, &ignored);
-    (void)removed; /* the next run does it */
+    (void)removed; /* if not, the next run removes it */
     return ok;
 }

@@ -9,23 +9,24 @@ struct reproduce_options {
     const char *scene;      /* NULL: where the command says, from the current directory */
     const char *keep;       /* file that gets what was made again; NULL: none */
     int threads;            /* 0: all processors */
-    bool run_foreign;       /* run programs that results name, too */
+    bool run_foreign;       /* also run programs, other than ours, that results.json names */
 };
 
 struct reproduced {
-    char *command; /* that was run, or "assay merge ..." */
+    char *command; /* that was run, or "assay merge ..."; owned */
     char made_by
         [128]; /* version and commit of the program that wrote the file; "" if it does not say */
     double num_values, num_different;
-    char first[300]; /* where and what, of the first value that differs */
-    char note[300];  /* "", or what else may be why */
+    char first[300]; /* the first value that differs: where, then and now */
+    char note[300];  /* "", or another possible cause of differences */
 };
 
-/* Also of one that is zero. */
+/* Frees it and sets it to zero; *r may be zero. */
 void reproduced_free(struct reproduced *r);
 
-/* False if it cannot be judged: no provenance, a scene, camera or environment file that is not the one of then, a program that fails
- * or is not ours. That values differ is no failure but num_different > 0. */
+/* Makes the file at path again and compares. False if that is impossible: it does not state its origin, a scene,
+ * camera or environment file has changed, or a program fails or is not ours. Values that differ are not a failure:
+ * num_different > 0. The caller calls reproduced_free(). */
 NODISCARD bool reproduce(const char *path, const struct reproduce_options *opt,
                          struct reproduced *out, struct err *e);
 

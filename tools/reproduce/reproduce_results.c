@@ -15,12 +15,12 @@
 
 enum { MAX_PATH = 4096 + 64, MORE_WORDS = 8 };
 
-/* Words that are not repeated: where outputs go, and how it was run. */
+/* Options that are left out: where outputs go, and how the command was run. */
 static const struct option_words how[] = {
     {"-o", 1}, {"--out", 1},   {"--json", 1},    {"-r", 1},      {"--report", 1},     {"-q", 0},
     {"-t", 1}, {"--quiet", 0}, {"--threads", 1}, {"--slurm", 0}, {"--page-every", 1}, {0}};
 
-/* What another run of the same has otherwise. */
+/* Does the member belong to the run itself, so that it differs between runs of the same command? */
 static bool is_of_the_run(const char *key)
 {
     static const char *const whole[] = {"command", "date", "machine", "version"};
@@ -46,7 +46,8 @@ static void tell(const char *at, const json_t *then, const json_t *now, struct r
     free(b);
 }
 
-/* Adds what two of them have in values to out, the first that differs by its place: "claims[3].difference". */
+/* Compares two documents and adds their values to the counts in out; out->first names the first that differs by its
+ * place, "claims[3].difference". */
 static void walk(const char *at, const json_t *then, const json_t *now, struct reproduced *out)
 {
     char path[120];
@@ -75,7 +76,7 @@ static void walk(const char *at, const json_t *then, const json_t *now, struct r
         tell(at, then, now, out);
 }
 
-/* Where the command is told to put what is compared: option and file, and the file of results among it. */
+/* The option and file that tell the command where to write, and the path of the results file there (product). */
 static bool choose_output(const char *path, const char *verb, const char *dir, const char **option,
                           char file[MAX_PATH], char product[MAX_PATH], struct err *e)
 {
@@ -92,7 +93,7 @@ static bool choose_output(const char *path, const char *verb, const char *dir, c
            err_set(e, "%s: made by 'assay %s', which is not made again", path, verb);
 }
 
-/* The value of a long option that `word` is, there or in the next word; NULL: it is another word. */
+/* If *word is the long option `name`, its value, from that word or the next; else NULL. */
 static const char *value_of(const char *const *word, const char *name)
 {
     size_t n = strlen(name);
@@ -107,8 +108,9 @@ static bool same_file(const char *a, const char *b)
     return stat(a, &x) == 0 && stat(b, &y) == 0 && x.st_dev == y.st_dev && x.st_ino == y.st_ino;
 }
 
-/* Does the command run nothing but what validate and converge find by themselves? It may name our renderer, a description of
- * another program, or the directory of cycles.py, which Blender runs; a description named without its path is one of ours. */
+/* Fails if the command names a program other than those that validate and converge use by default: another
+ * renderer, the path of a description of an engine, or another directory of cycles.py, which Blender runs. A
+ * description named without a path is one of ours. */
 static bool check_programs(const char *path, const char *const *word, struct err *e)
 {
     const struct data_dirs at = data_dirs_find();
@@ -125,8 +127,8 @@ static bool check_programs(const char *path, const char *const *word, struct err
     return true;
 }
 
-/* Leaves out words of `how` in options written together, "-qt2": of the verbs' letters only -q, which is given anyway, stands before
- * others. */
+/* Removes options of `how` that are written together with others or with their value, "-qt2". Only -q, which is given
+ * anyway, can stand before other letters. Returns how many words are left. */
 static int together_kept(int num, char **word)
 {
     int n = 0;
@@ -144,7 +146,7 @@ static int together_kept(int num, char **word)
     return n;
 }
 
-/* Runs the command with its outputs in `dir`. product: gets the path of the results there. */
+/* Runs the command with its outputs in `dir`. product: receives the path of the results there. */
 static bool run_again(const char *path, const struct reproduce_options *opt, const json_t *then,
                       int num, char **word, const char *dir, char product[MAX_PATH],
                       struct reproduced *out, struct err *e)

@@ -1,4 +1,4 @@
-/* Makes an image again by the command that its attributes have. */
+/* Makes an image again with the command that is stored in its attributes. */
 #include "reference/base/process.h"
 #include "reference/store/reference_render.h"
 #include "renderer/base/cli.h"
@@ -36,7 +36,7 @@ static const char *attr(const struct image *im, const char *name)
 
 enum { MORE_WORDS = 12, NUMBER = 16 };
 
-/* The scene has to be here, with the hash that the image says. */
+/* Checks that the scene file is here and has the hash that the image states. */
 static bool check_scene(const char *path, const struct image *im, const char *scene, struct err *e)
 {
     const char *then = attr(im, "assay:scene");
@@ -52,7 +52,7 @@ static bool check_scene(const char *path, const struct image *im, const char *sc
                     path, scene, then, now));
 }
 
-/* A render that is made again, into the file `to`, by the words of its command. */
+/* An image that is made again, into the file `to`, with the words of its command. */
 struct remaking {
     const char *path, *to;
     const struct reproduce_options *opt;
@@ -64,7 +64,7 @@ struct remaking {
     char threads[NUMBER], spp[NUMBER];
 };
 
-/* The words of the render, as they are to be run; argv: room for as many as r->word has and MORE_WORDS more. Ours come
+/* Fills argv with the command to be run; it has room for the words of r->word and MORE_WORDS more. Our options come
  * first, as "--" may end the options. */
 static bool command_of(struct remaking *r, const char **argv, struct err *e)
 {
@@ -86,7 +86,8 @@ static bool command_of(struct remaking *r, const char **argv, struct err *e)
                           r->to};
     int n = (int)(sizeof ours / sizeof *ours);
     memcpy(argv, ours, sizeof ours);
-    /* Where it was the default, the most that a pilot grants would now be the last of the samples. */
+    /* With a pilot, --samples needs -s, the most samples that a pixel may get, which may have been left at its
+     * default. */
     if (o.pilot_tolerance >= 0) {
         snprintf(r->spp, sizeof r->spp, "%d", o.spp);
         argv[n++] = "-s";
@@ -98,7 +99,7 @@ static bool command_of(struct remaking *r, const char **argv, struct err *e)
     return true;
 }
 
-/* The same render by metadata: another camera file, say, is another render. */
+/* Compares the metadata that says what was rendered: with another camera file, for example, it is another render. */
 static bool check_same(const char *path, const struct image *a, const struct image *b,
                        struct err *e)
 {
@@ -112,7 +113,7 @@ static bool check_same(const char *path, const struct image *a, const struct ima
     return true;
 }
 
-/* Bit by bit. False if size or channels are others. */
+/* Compares all values bit by bit. False if size or channels differ. */
 static bool compare(const char *path, const struct image *a, const struct image *b,
                     struct reproduced *out, struct err *e)
 {
@@ -150,7 +151,7 @@ static bool remake_render(struct remaking *r, struct err *e)
     return ok;
 }
 
-/* The same of sums of sample ranges: their jobs, run here one after the other and added up as they were. */
+/* The same for a sum of sample ranges: runs their jobs here one after the other, and adds them up as before. */
 static bool remake_ranges(struct remaking *r, struct err *e)
 {
     enum { BEFORE = 6 }; /* words that plan it */
@@ -186,7 +187,7 @@ static bool remake_ranges(struct remaking *r, struct err *e)
 
 static bool remake(struct remaking r, struct err *e);
 
-/* Shares are made again each and then put together; their paths are those of the command. */
+/* Makes each share again, then merges them; the shares' paths are those in the command. */
 static bool remake_merge(const struct remaking *r, struct err *e)
 {
     int shares = r->num - 3, read = 0;
@@ -218,7 +219,7 @@ static bool remake_merge(const struct remaking *r, struct err *e)
     return ok && reproduced_command(r->out, (const char *const *)r->word, e);
 }
 
-/* r: without image and words. */
+/* Makes the image at r.path again; r.im and r.word are filled in here. */
 static bool remake(struct remaking r, struct err *e)
 {
     enum { MOST_DEPTH = 16 };
@@ -258,7 +259,8 @@ static bool directory_of(const char *path, const char *scene, const char *engine
     return true;
 }
 
-/* What may be why it differs: another engine than then, or another processor, whose instructions round otherwise. */
+/* Notes a possible cause of differences: another version or build of the engine, or another processor that rounds
+ * differently. */
 static void compare_engines(const json_t *then, const json_t *now, struct reproduced *out)
 {
     const char *a = member_text(then, "version"), *b = member_text(now, "version");

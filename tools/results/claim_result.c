@@ -22,7 +22,7 @@ static json_t *region_json(const struct region *r)
                      r->log10_p, "margin", r->margin);
 }
 
-/* Tiles without noise have no test: null, not a number. */
+/* A tile without noise has no test: its element is null. */
 static json_t *tile_array(const double *value, int n)
 {
     json_t *a = json_array();
@@ -135,7 +135,7 @@ static const struct shape cost_shape = {.names = {[IS_NUMBER] = "a b"}};
 static const struct shape look_shape = {
     .names = {[IS_TEXT] = "verdict", [IS_NUMBER] = "n_a n_b alpha", [IS_COUNT] = "stage"}};
 
-/* A claim that could not be judged has these and no more. */
+/* Checked of every claim; of one that could not be judged nothing else is checked. */
 static const struct shape any_claim_shape = {
     .names = {[IS_TEXT] = "scene a b expected title? detects? blind_to? error? quantity? rerun?",
               [IS_NUMBER] = "alpha_claim? alpha_spent?",
@@ -175,7 +175,7 @@ static const struct shape judged_shape = {
              {"variance_ratio?", &variance_ratio_shape, PART_OBJECT},
              {"rays_a?", &rays_shape, PART_OBJECT}}};
 
-/* One number, or null where a tile has no noise and so no test, for each tile. */
+/* An array with one element for each tile: a number, or null where the tile has no noise and so no test. */
 static bool check_tiles(const json_t *claim, const char *name, size_t num, const char *where,
                         struct err *e)
 {

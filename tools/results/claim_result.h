@@ -6,33 +6,34 @@
 
 #include <jansson.h>
 
-/* Who is compared with whom, and what should come out. */
+/* What a claim compares, which verdict is expected, and with which options. */
 struct claim_context {
     const struct suite_scene *scene; /* NULL: two files; a, b are then their names */
     const char *a, *b;
     const char *fidelity; /* "class" in results.json; NULL: none */
     enum verdict expected;
     struct compare_options opt;
-    double accept_mdb[2]; /* of the image, of a tile: NO DIFFERENCE FOUND passes if expected and no
-                             more than that could have been missed; 0: never */
+    double accept_mdb[2]; /* image, tile: the largest MDB (relative) with which an expected NO
+                             DIFFERENCE FOUND passes; 0: it never does */
     const char *rerun;    /* the command that judges this claim alone */
 };
 
-/* Is the verdict the one expected and, of NO DIFFERENCE FOUND, the MDB small enough? */
+/* Is the verdict the expected one and, for NO DIFFERENCE FOUND, is each MDB small enough? */
 bool claim_result_passes(const struct claim_context *c, const struct comparison *result);
 
-/* New references, NULL if out of memory. */
+/* A claim as JSON: judged, or with its error. New references; NULL if out of memory. */
 json_t *claim_result_judged(const struct claim_context *c, const struct comparison *result);
 json_t *claim_result_not_judged(const struct claim_context *c, const char *error);
 
-/* Adds how often and by what a side was observed: n, unit, spp (side "a" or "b"). */
+/* Adds n_SIDE (fewest observations of any pixel), unit_SIDE and spp_SIDE; side: "a" or "b". */
 bool claim_result_add_observations(json_t *claim, const char *side, const struct moments *m);
 
-/* Has a claim of a file all that results.h promises? The line begins with `where`. */
+/* Does a claim that was read have all that results.h promises? Error lines begin with `where`. */
 NODISCARD bool claim_result_check(const json_t *claim, const char *where, struct err *e);
 
-/* A new results object with everything but claims: command line (a verb and its arguments, NULL at argv[argc]; in words that
- * shell_quote_split() reads back), date, machine. NULL with a line if an argument is no UTF-8, and out of memory. */
+/* Results without claims: command (argv: verb and arguments, argv[argc] NULL; quoted so that shell_quote_split()
+ * reads it back), version, date, machine, alpha. A new reference; NULL with a line if an argument is not UTF-8 or
+ * memory runs out. */
 NODISCARD json_t *claim_result_new_results(int argc, char **argv, double alpha, struct err *e);
 
 #endif

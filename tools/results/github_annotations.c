@@ -2,7 +2,7 @@
 
 #include "results.h"
 
-/* What would end the text of a command, or, in a property, end the property. */
+/* Percent-encodes whatever would end the command or, in a property, the property. */
 static void print_escaped(FILE *f, const char *s, bool property)
 {
     for (; s != NULL && *s != '\0'; s++) {

@@ -6,13 +6,13 @@
 #include <jansson.h>
 #include <stdio.h>
 
-/* "::error title=..::.." where a claim came out the opposite or could not be judged, "::warning .." where it
- * stayed undecided, and "::notice .." with the headline. Text from the file cannot end a command or start
- * another one. Format: "Workflow commands for GitHub Actions". */
+/* "::error title=..::.." for a claim with the opposite verdict or one that could not be judged, "::warning .." for an
+ * undecided one, and "::notice .." with the headline. Texts of the file are escaped: they can neither end a command nor
+ * begin one. Format: "Workflow commands for GitHub Actions". */
 void github_annotations_print(FILE *f, const json_t *results);
 
-/* The headline in words: "All 5 claims came out as expected." The convergence and the stated errors are
- * counted as claims. */
+/* The headline in words: "All 5 claims came out as expected." Stated errors, noise and convergence count
+ * as claims. */
 void github_annotations_headline(FILE *f, const json_t *results);
 
 #endif

@@ -35,7 +35,7 @@ static bool add_run(struct history *h, const char *path, size_t root, struct err
     return true;
 }
 
-/* root: how much of every path is the directory that was asked for. */
+/* Adds the runs below dir. root: length of the prefix of every path that is the directory asked for. */
 static bool walk(struct history *h, const char *dir, size_t root, int depth, struct err *e)
 {
     DIR *d = opendir(dir);
@@ -126,7 +126,7 @@ static double std_error(const struct history_point *p)
     return (p->high - p->low) / 2 / gsl_cdf_ugaussian_Qinv(fmin(p->alpha, 0.4));
 }
 
-/* Weighted by 1/variance; equal weights where nothing has any noise. */
+/* Fills earlier and z. Weights: 1/variance, and 0 for points without noise; equal if none has any. */
 static void find_move(const struct history *h, struct history_series *s)
 {
     if (s->num < 2 || s->point[s->num - 1].run != h->num_runs - 1)

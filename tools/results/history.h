@@ -1,11 +1,12 @@
-/* Many runs of `assay validate` or `compare`, oldest first: what each claim measured in each of them, and
- * whether the last run moved.
+/* Many runs of `assay validate` or `compare`, oldest first: what each run measured of every claim, and whether
+ * the last run has moved away from the earlier ones.
  *
- * Moved: H0: the last difference has the mean of the earlier ones. z = (last - weighted mean of the earlier)
- * over the root of the sum of both variances; the standard error of a difference is half its interval over the
- * normal quantile of its alpha, which skewness only makes larger. The noise of a stored reference is in
- * all runs alike, so the test is cautious. |z| above the quantile of alpha/2 over all series (Bonferroni)
- * is "moved": family-wise alpha. Runs of the same code and seed have the same numbers, and z is 0. */
+ * H0: the last difference has the expectation of the earlier ones. z = (last - inverse-variance weighted mean of
+ * the earlier) / sqrt(sum of both variances). The standard error of a difference is half its interval over the
+ * normal quantile at its alpha; intervals are widened for skewness, so it is never too small. The noise of a
+ * stored reference is the same in all runs and cancels, so the test is conservative. A series has moved if |z|
+ * exceeds the critical value at alpha/2 over the number of series (Bonferroni: family-wise error rate alpha).
+ * Runs of the same code and seed have the same numbers, and z is 0. */
 #ifndef ASSAY_HISTORY_H
 #define ASSAY_HISTORY_H
 
@@ -24,17 +25,17 @@ struct history_point {
     size_t run;
     double alpha;                 /* of the claim */
     double difference, low, high; /* relative */
-    double variance_ratio;        /* a path of A over one of B */
+    double variance_ratio;        /* of one path, A over B */
     double seconds;               /* of A */
-    double efficiency; /* paths of B a second that say as much as A's: n/(ratio seconds) */
+    double efficiency; /* paths of B per second that are worth A's: n/(ratio x seconds) */
 };
 
 struct history_series {
-    const char *scene, *a, *b, *quantity; /* of the runs */
+    const char *scene, *a, *b, *quantity; /* borrowed from the runs */
     struct history_point *point;
     size_t num;
     double earlier,
-        z; /* the mean before the last run; 0 where there are no two points or the last run lacks it */
+        z; /* weighted mean of the earlier runs, and z; 0 with fewer than two points, or none in the last run */
 };
 
 struct history {
@@ -46,15 +47,15 @@ struct history {
     size_t moved;
 };
 
-/* Reads every file named results.json below dir (8 levels, no links). Fails with a line on one that cannot
- * be read, if there is none, and on more than 400. The caller frees with history_free(). */
+/* Reads every file named results.json below dir (8 levels, no links). Fails with a line if one cannot be read or
+ * has a claim twice, if there is none, or if there are more than 400. The caller frees with history_free(). */
 NODISCARD bool history_read(const char *dir, double alpha, struct history *out, struct err *e);
 void history_free(struct history *h);
 
-/* "d36ec014cebb" of "0.1 (commit d36ec014cebb)", else all of the version. */
+/* The commit of a run: "d36ec014cebb" of "0.1 (commit d36ec014cebb)"; else its whole version. */
 void history_commit(const struct history_run *run, char *out, size_t size);
 
-/* The page: a row for each series, with plots against the runs. By rename. */
+/* Writes the page (report/report_history.c): a row of plots against the runs for each series. Appears by rename. */
 NODISCARD bool report_history(const struct history *h, const char *path, struct err *e);
 
 #endif

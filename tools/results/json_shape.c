@@ -56,13 +56,13 @@ static const char *wanted(const json_t *v, enum shape_kind kind)
     return "known";
 }
 
-/* The object that is looked at, as lines name its members: "FILE: claim 1", "rungs.". */
+/* The object being checked; error lines name its members by where ("FILE: claim 1") and within ("rungs."). */
 struct place {
     const json_t *object;
     const char *where, *within;
 };
 
-/* The next of `names`, and the sign behind it, or a blank; false where there is none. */
+/* Takes the next of *names, and into *sign the '?' or '~' behind it, else ' ' or NUL. False if none is left. */
 static bool next_name(const char **names, char name[64], char *sign)
 {
     *names += strspn(*names, " ");

@@ -1,4 +1,4 @@
-/* What an object of results.json has to hold. */
+/* Checks the members of objects in results.json against tables of names and types. */
 #ifndef ASSAY_JSON_SHAPE_H
 #define ASSAY_JSON_SHAPE_H
 
@@ -21,11 +21,11 @@ enum shape_kind {
     NUM_SHAPE_KINDS
 };
 
-/* An object, or a list of at least so many. */
+/* A part is an object, or a list of at least that many objects. */
 enum shape_part { PART_OBJECT = -1, PART_LIST = 0, PART_LIST_OF_1 = 1, PART_LIST_OF_2 = 2 };
 
-/* Names of each kind with a blank between: "name" has to be there, "name?" may be absent, "name~" may be null. And the parts of the
- * object, as many as have a name. */
+/* The members of an object. names: those of each kind, separated by blanks; "name" is required, "name?" may be absent,
+ * "name~" may be null. part: members that are objects or lists of them, up to the first without a name. */
 struct shape {
     const char *names[NUM_SHAPE_KINDS];
     struct {
@@ -35,14 +35,14 @@ struct shape {
     } part[8];
 };
 
-/* What an engine that is not judged has for a verdict. */
+/* "MEASURED": the verdict of an engine that is not judged. */
 extern const char json_shape_measured[];
 
-/* The line of a failure begins with `where` and names the member, "rungs.spp" say. */
+/* Error lines begin with `where` and name the member, such as "rungs.spp". */
 NODISCARD bool json_shape_check(const json_t *object, const struct shape *shape, const char *where,
                                 struct err *e);
-/* A row has either an "error" (and then is not "passed", and has a "verdict" only if time was missing), or what is in `judged`,
- * with a "verdict" that agrees with "passed". */
+/* Checks a row: it has either an "error" (then "passed" is false, and a "verdict" can only be INCONCLUSIVE: the
+ * time was over), or the members of `judged` and a "verdict" that agrees with "passed". */
 NODISCARD bool json_shape_check_row(const json_t *row, const struct shape *judged,
                                     const char *where, struct err *e);
 

@@ -22,7 +22,7 @@ static char *xml_text(const char *s)
         if ((u < 0x20 && u != '\t' && u != '\n' && u != '\r') || u == 0x7f)
             *c = '?';
     }
-    /* U+FFFE and U+FFFF, UTF-8 EF BF BE and EF BF BF, are no XML characters either. */
+    /* U+FFFE and U+FFFF, UTF-8 EF BF BE and EF BF BF, are not XML characters either. */
     for (char *c = strstr(copy, "\xef\xbf"); c != NULL; c = strstr(c + 2, "\xef\xbf"))
         if ((unsigned char)c[2] >= 0xbe)
             /* NOLINTNEXTLINE(bugprone-not-null-terminated-result): into a longer text. */
@@ -53,7 +53,7 @@ static bool write_text(xmlTextWriter *w, const char *value)
     return ok;
 }
 
-/* Of noise its reason has them. */
+/* The numbers of a claim; those of a row of noise are in its reason. */
 static bool write_numbers(xmlTextWriter *w, const json_t *claim)
 {
     if (json_object_get(claim, "mdb_global") == NULL)
@@ -107,7 +107,7 @@ static bool write_testcase(xmlTextWriter *w, const json_t *claim)
            write_verdict(w, claim, results_claim_outcome(claim)) && xmlTextWriterEndElement(w) >= 0;
 }
 
-/* A line for each that is as expected. */
+/* <system-out>: a line for each claim that came out as expected. */
 static bool write_output(xmlTextWriter *w, const json_t *claims)
 {
     bool ok = xmlTextWriterStartElement(w, BAD_CAST "system-out") >= 0;

@@ -148,7 +148,7 @@ void noise_results_cell(const json_t *row, size_t column, char text[TEXT_TABLE_C
     }
 }
 
-/* The reason, of what did not pass. */
+/* The reasons of the rows that did not pass. */
 static void print_reasons(FILE *f, const json_t *noise)
 {
     json_each(row, noise) {

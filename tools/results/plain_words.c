@@ -5,7 +5,7 @@
 
 enum { MOST_FAILURES = 3, MOST_NAMES = 16 };
 
-/* The interval lies beyond the margin on one side: that side's sign, else 0. */
+/* 1 or -1 if the whole interval lies above or below the margin, else 0. */
 static int outside(const json_t *object, const char *key, double margin)
 {
     const json_t *ci = json_object_get(object, key);
@@ -108,7 +108,7 @@ static bool is_variant_of(const char *text, const char *name)
     return strncmp(text, name, n) == 0 && (text[n] == '\0' || text[n] == '-');
 }
 
-/* The different texts of a key without variants, "a, b and c"; beyond a few only that there are more. */
+/* The distinct values of a key, variants left out: "a, b and c"; beyond six "and other NOUN". */
 static struct plain_words names(const json_t *claims, const char *key, const char *noun)
 {
     const char *name[MOST_NAMES + 1];
@@ -141,7 +141,7 @@ static size_t num_scenes(const json_t *claims)
     return num;
 }
 
-/* The worst claims, then the others. bad: how many there are of all. */
+/* A few failures: claims, worst outcome first, then stated errors and noise. bad: the number of all failures. */
 static void print_failures(FILE *f, const json_t *results, size_t bad)
 {
     const json_t *claims = json_object_get(results, "claims");

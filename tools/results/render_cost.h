@@ -1,4 +1,4 @@
-/* What a validation spent its rendering on, from its results. */
+/* Where a validation spent its rendering time, computed from its results. */
 #ifndef ASSAY_RENDER_COST_H
 #define ASSAY_RENDER_COST_H
 
@@ -8,15 +8,15 @@
 
 enum { MAX_COSTS = 512 };
 
-/* Of one scene: its claims and its claim of consistency. */
+/* The cost of one scene: of its claims and of its check of stated errors. */
 struct scene_cost {
     const char *scene;
-    double ours_s, references_s; /* CPU seconds rendered in this run; of --engine: ours_s */
-    double largest_n;            /* observations of the tested side, at most */
+    double ours_s, references_s; /* CPU seconds of renders in this run; --engine counts as ours */
+    double largest_n;            /* most observations per pixel of the tested side at any look */
     int claims, looks, undecided;
 };
 
-/* Largest first; at most MAX_COSTS scenes, the number of them is returned. */
+/* Fills out, the costliest scene first, and returns their number; scenes beyond MAX_COSTS are left out. */
 int render_cost_gather(const json_t *results, struct scene_cost out[MAX_COSTS]);
 
 /* "cost: 41_cornell 38 s of 120 s, ...": the costliest scenes on one line; nothing where nothing was

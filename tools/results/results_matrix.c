@@ -71,7 +71,7 @@ static const json_t *engine_of(const json_t *scene, const char *name)
     return NULL;
 }
 
-/* Of a over the engine that all are compared with, at the first or the last rung. */
+/* The ratios of `a` to the first engine of the table, at the first or the last rung; NULL: none. */
 static const json_t *ratio_of(const json_t *scene, const char *a, bool last)
 {
     const json_t *ratios = json_object_get(scene, "ratios");

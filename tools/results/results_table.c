@@ -85,7 +85,7 @@ static const char *cell_text(const struct column *c, const json_t *claim, bool m
     return buffer;
 }
 
-/* The claims, and those of the columns that are shown as text. */
+/* The claims, and the columns that have a heading in text. */
 struct shown {
     const json_t *claims;
     const struct column *column[NUM_COLUMNS];

@@ -4,17 +4,17 @@
 
 #include "results.h"
 
-/* What a cell shows of the claim's member `key`. */
+/* How a cell shows the claim's member `key`. */
 enum column_kind {
     COLUMN_VERDICT,
     COLUMN_TEXT,
     COLUMN_SCENE,
     COLUMN_TESTED,
     COLUMN_REFERENCE,
-    COLUMN_MARK, /* of what did not come out as expected */
-    /* Of claims that could be judged: */
+    COLUMN_MARK, /* did it come out as expected? */
+    /* Only for claims that could be judged: */
     COLUMN_PLOT,       /* the interval beside the margin */
-    COLUMN_DIFFERENCE, /* a fraction, as signed per cent; outside of pages with the interval "ci" */
+    COLUMN_DIFFERENCE, /* a fraction, as signed per cent; in text followed by the interval "ci" */
     COLUMN_INTERVAL,   /* of fractions, as per cent */
     COLUMN_PERCENT,    /* a fraction, as per cent */
     COLUMN_SECONDS,
@@ -24,14 +24,15 @@ enum column_kind {
 struct column {
     const char *key;
     enum column_kind kind;
-    /* Headings in the terminal and in Markdown, in a page, and in CSV, where an interval has two; NULL: not there. */
+    /* Headings: text in terminal and Markdown, page, csv (an interval has two names); NULL: the column is not shown
+     * there. */
     const char *text, *page, *csv;
-    const char *help; /* for those who read the page, HTML; NULL: none */
+    const char *help; /* explanation on the page, HTML; NULL: none */
 };
 extern const struct column results_columns[];
 extern const size_t results_num_columns;
 
-/* A number, which stands right-aligned. */
+/* Does the column hold numbers, which are right-aligned? */
 bool column_is_number(const struct column *c);
 
 /* Scene, engines, difference with interval, MDB, margin and verdict of every claim, then a line for each that could

@@ -28,7 +28,7 @@ bool stated_error_check(const json_t *consistency, const char *path, struct err 
     return true;
 }
 
-/* The last columns: noise, and pixels that break the stop rule; empty where the scene does not ask. */
+/* The last columns: noise, and pixels that break the stopping rule; empty if the scene does not ask for it. */
 static void print_more(FILE *f, const json_t *c, const char *before)
 {
     fputs(before, f);

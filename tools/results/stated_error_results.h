@@ -8,10 +8,10 @@
 
 #include <stdio.h>
 
-/* Checks all that the functions below rely on; a failure is a line with file, scene and member. */
+/* Checks all that stated_error_print() and the report rely on; the error line names file, row and member. */
 NODISCARD bool stated_error_check(const json_t *consistency, const char *path, struct err *e);
 
-/* A line for each, for a terminal or as a Markdown table; nothing where there is none. */
+/* Prints a line for each row, for a terminal or as a Markdown table; nothing if there are no rows. */
 void stated_error_print(FILE *f, const json_t *consistency, bool markdown);
 
 #endif

@@ -33,7 +33,7 @@ bool kept_run_path(const char *store, const char *of, const struct sandbox *s,
     return true;
 }
 
-/* If it is there. */
+/* Copies a file if it is there. */
 static bool copy_one(const char *name, const char *from, const char *to, struct err *e)
 {
     const struct path a = fs_path("%s/%s", from, name);

@@ -19,7 +19,7 @@ NODISCARD bool kept_run_path(const char *store, const char *of, const struct san
  * False: it is not in the store. */
 bool kept_run_read(const char *dir, const struct sandbox_job *job, struct sandbox_result *out);
 
-/* Adds a run to the store. */
+/* Adds a run to the store, in place of what is there. */
 NODISCARD bool kept_run_write(const char *dir, const struct sandbox_job *job,
                               const struct sandbox_result *result, struct err *e);
 

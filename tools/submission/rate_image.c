@@ -54,7 +54,8 @@ bool rate_image_read(const char *path, const struct rubric_image *p, int batch,
         return err_set(e, "%d batches of %d cannot be told apart by 8 bits", most / batch, batch);
     if (!read_file(path, p, &pic, e))
         return false;
-    /* Whether the sample after which it stopped is counted is not said; but a batch has to be told from the next. */
+    /* One sample is allowed, as the assignment leaves open whether the last one counts; but batches
+     * have to be told apart. */
     double allowed =
         fmin(rounding + codes_of_all / most, fmax(rounding, codes_of_all * batch / most / 4));
     for (size_t i = 0; i < (size_t)p->width * (size_t)p->height; i++) {

@@ -1,4 +1,5 @@
-/* The assignment's image of sampling rates: blue (none) through green (half) to red (all samples), 8 bits. */
+/* The assignment's image of sampling rates, 8 bits: blue (no samples) through green (half) to red
+ * (all). */
 #ifndef ASSAY_RATE_IMAGE_H
 #define ASSAY_RATE_IMAGE_H
 
@@ -7,10 +8,10 @@
 
 struct rate_image {
     double pixels,
-        odd; /* pixels of a colour that no multiple of the batch has, within one sample and 2 codes */
+        odd; /* pixels whose colour is no multiple of the batch, to within one sample and 2 codes */
     double early;    /* pixels that did not take all samples */
     double mean;     /* samples a pixel */
-    double more, sd; /* mean over that of `expected`, less 1, and its standard deviation */
+    double more, sd; /* mean over that of `ours`, less 1, and its standard deviation */
 };
 
 /* Reads the rate image of an image of the rubric. ours: its n is the number of samples of each pixel in
@@ -20,7 +21,7 @@ struct rate_image {
 NODISCARD bool rate_image_read(const char *path, const struct rubric_image *p, int batch,
                                const struct moments *ours, struct rate_image *out, struct err *e);
 
-/* Samples of each pixel by its colour alone, 1 at least. */
+/* Fills count[], one per pixel by rows, with its samples by its colour alone, at least 1. */
 NODISCARD bool rate_image_counts(const char *path, const struct rubric_image *p, double *count,
                                  struct err *e);
 

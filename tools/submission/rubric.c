@@ -20,7 +20,7 @@ struct statement {
     char *rest;                 /* what has not been taken, without spaces around */
     struct rubric_image *image; /* the block that the line stands in; at most one is not NULL */
     struct rubric_check *check;
-    bool varies; /* something with the number of the variant was read */
+    bool varies; /* a statement with {variant} was read */
 };
 
 static char *take_word(struct statement *s)
@@ -134,7 +134,7 @@ static void read_limit(struct statement *s)
             "'limit %s' is none of wall, cpu, build, memory, build-memory, disk, processes", what);
 }
 
-/* One line of several. */
+/* Appends one of several 'build' lines. */
 static void read_build(struct statement *s)
 {
     char *build = s->r->build;
@@ -199,7 +199,7 @@ static void read_image(struct statement *s)
     r->num_images++;
 }
 
-/* By its old word. */
+/* An image by its old word, "picture". */
 static void read_picture(struct statement *s)
 {
     s->r->old_word_line = s->r->old_word_line > 0 ? s->r->old_word_line : s->line;
@@ -314,7 +314,7 @@ static void read_accept(struct statement *s)
     ++*num;
 }
 
-/* Once, before what depends on it. */
+/* Stands once, before any {variant}. */
 static void read_variants(struct statement *s)
 {
     struct rubric *r = s->r;
@@ -346,7 +346,8 @@ static void fill_in_variant(struct statement *s, const char *word)
     }
 }
 
-/* A statement that fills a member of the rubric, or of the image or check that it stands in; `read`: all others. */
+/* A statement that fills a member of the rubric, or of the image or check that it stands in; or,
+ * with `read`, any other. */
 struct member {
     const char *word;
     enum { TEXT, WHOLE, NUMBER, MARGIN, IMAGE } value;
@@ -470,7 +471,7 @@ bool rubric_read(const char *path, const struct suite *suite, int variant, struc
         size_t n = strlen(line);
         read += n;
         s.line++;
-        if (s.line == 1 && strncmp(line, "\xef\xbb\xbf", 3) == 0) /* which some editors put first */
+        if (s.line == 1 && strncmp(line, "\xef\xbb\xbf", 3) == 0) /* a byte order mark */
             memset(line, ' ', 3);
         if (n == sizeof line - 1 && line[n - 1] != '\n') {
             rubric_mistake(m, s.line, "longer than %d characters", MAX_LINE - 2);

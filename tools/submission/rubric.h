@@ -41,7 +41,7 @@ extern const char *const rubric_reference_names[]; /* "none", "truth", ... */
 
 struct accepted {
     int line;
-    char name[48], how[256]; /* words, or a file */
+    char name[48], how[256]; /* how: options of our renderer, or a moments file */
 };
 
 /* A set of accepted deviations that a program may have all at once. The first set is empty. */
@@ -107,11 +107,11 @@ struct rubric {
     struct rubric_check check[RUBRIC_CHECKS];
     int num_parts, num_images, num_checks;
     int variants, variant; /* how many there are, and which one this is, from 1; 0: none */
-    int old_word_line;     /* the first that says "picture" for "image"; 0: none does */
+    int old_word_line;     /* the first that says "picture" for "image"; 0: none */
 };
 
 struct rubric_mistakes {
-    int num; /* of them the first 64 are kept */
+    int num; /* how many; the first 64 are kept */
     struct {
         int line;
         char text[200];
@@ -125,8 +125,8 @@ struct rubric_mistakes {
 NODISCARD bool rubric_read(const char *path, const struct suite *suite, int variant,
                            struct rubric *out, struct rubric_mistakes *m, struct err *e);
 
-/* The number after an option of an image; k 1: the one after that, as in `-a BATCH TOLERANCE`. 0: there is
- * none. */
+/* The k-th number (k 0, 1) after an option of an image, as in `-a BATCH TOLERANCE`; 0 if the option
+ * is not there. */
 double rubric_option(const struct rubric_image *p, const char *option, int k);
 
 /* Is the image sampled adaptively (`-a BATCH TOLERANCE` with a batch of at most spp)? */

@@ -71,7 +71,7 @@ static bool is_word(const char *word, const char *const *words)
     return false;
 }
 
-/* Where there is no line to blame: that of the first statement. */
+/* The line given for mistakes of the rubric as a whole. */
 enum { LINE_WHOLE = 1 };
 
 static void set_default(char *text, size_t size, const char *value)
@@ -276,7 +276,7 @@ static void append(char *text, size_t size, const char *between, const char *mor
     text_append(text, size, "%s%s", text[0] != '\0' ? between : "", more);
 }
 
-/* Every choice of those by words, then those that images show. */
+/* Lists all combinations of deviations given by options, then those given by images. */
 static void list_sets(struct rubric *r, struct rubric_mistakes *m)
 {
     r->num_sets = 1 << r->num_accepted;

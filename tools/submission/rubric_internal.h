@@ -7,7 +7,8 @@
 void rubric_mistake(struct rubric_mistakes *m, int line, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 
-/* What is missing or does not fit together, once all lines are read. */
+/* Reports what is missing or does not fit together, once all lines are read, and sets defaults,
+ * image.suite and set[]. */
 void rubric_check_whole(struct rubric *r, const struct suite *suite, struct rubric_mistakes *m);
 
 #endif

@@ -23,7 +23,7 @@ static bool read_drawn(const char *path, int *variant, struct err *e)
     return ok || err_set(e, "%s: not the number of a variant", path);
 }
 
-/* Of several that draw at once, one does. */
+/* By link(): of several processes that draw at once, one wins. */
 static bool write_drawn(const char *path, int variant, struct err *e)
 {
     char text[16];

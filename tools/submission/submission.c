@@ -165,7 +165,8 @@ static bool find_image(const struct submission *s, const char *name, const char 
     return false;
 }
 
-/* Where the name of a path without slashes at its end begins, and how long it is; of an archive without what tells it. */
+/* The last part of a path, without slashes at its end. *length: of it, without the ending of an
+ * archive. */
 static const char *name_of(const char *path, int *length, bool *archive)
 {
     static const char *const ends[] = {".zip", ".tar",    ".tgz",     ".tbz",    ".txz",    ".7z",
@@ -201,7 +202,7 @@ static bool has(const struct submission *s, const char *name)
     return access(fs_path("%s/%s", s->path, name).s, F_OK) == 0;
 }
 
-/* Also sets s->program. Who hands in a program and no sources has built it. */
+/* Also sets s->program. A program handed in without sources is not built. */
 static enum submission_kind kind_of(const struct rubric *r, struct submission *s, bool is_directory,
                                     bool is_archive)
 {
@@ -316,7 +317,8 @@ static bool run_program(const struct rubric *r, const struct sandbox *box,
     return ok;
 }
 
-/* Copies an image of a directory to where those of programs are; `to` "" and the reason where there is none. */
+/* Copies an image that was handed in to out_dir, as `to`; if there is none `to` is "" and `why` the
+ * reason. */
 static bool take_image(const struct rubric *r, const struct submission *s, const char *name,
                        const char *ending, const char *out_dir, char *to, char *why, size_t size,
                        struct err *e)

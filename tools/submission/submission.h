@@ -15,13 +15,13 @@ extern const char *const submission_kind_name[]; /* "images", "program", "source
 
 /* Why none of its images could be made. */
 enum submission_state {
-    SUBMISSION_GRADED,      /* nothing */
+    SUBMISSION_GRADED,      /* nothing prevented it */
     SUBMISSION_NOT_BUILT,   /* it cannot be unpacked or built */
     SUBMISSION_NOT_STARTED, /* no program, a library is missing, or no run of it makes an image */
     SUBMISSION_USAGE        /* every run prints the program's usage text */
 };
 extern const char *const submission_state_name[]; /* "graded", "not_built", .. */
-extern const char submission_not_made[];          /* why there is no image where it is said once */
+extern const char submission_not_made[];          /* for an image: the reason is in submission.why */
 
 struct submission {
     enum submission_kind kind;
@@ -33,9 +33,9 @@ struct submission {
     bool packed;       /* an archive, or a directory in which the program has to be looked for */
     char library[1024]; /* LD_LIBRARY_PATH that it needs; "": none */
     enum submission_state state;
-    char why[600];    /* what is wrong with all of it, a sentence: "" if nothing */
+    char why[600];    /* what is wrong with the whole, a sentence; or "" */
     const char *runs; /* where runs are kept (kept_run.h), borrowed; NULL: nowhere */
-    bool runs_again;  /* what is kept is run again all the same */
+    bool runs_again;  /* run again even if kept */
 };
 
 /* One image as it came out. */
@@ -71,9 +71,9 @@ NODISCARD bool submission_build(const struct rubric *r, const struct sandbox *bo
                                 const char *cache, bool fill, const char *work, const char *log,
                                 struct submission *s, struct err *e);
 
-/* Gets one image of the rubric, or one like it with another name and other samples: finds it among those
- * handed in, or makes it in the sandbox and moves it to out_dir, where its log goes, too. A missing image
- * is no error: made->why says so. */
+/* Gets one image of the rubric, or one like it with another name and other samples: copies it from
+ * those handed in, or makes it in the sandbox; it goes to out_dir, as does the program's log. A
+ * missing image is no error: made->why says why. */
 NODISCARD bool submission_image(const struct rubric *r, const struct sandbox *s,
                                 const struct submission *sub, const struct rubric_image *p,
                                 const char *stage, const char *work, const char *out_dir,
@@ -94,8 +94,9 @@ bool submission_printed_usage(const char *log, char *why, size_t size);
 void submission_conclude(const struct rubric *r, const struct made *made, char (*why)[400],
                          struct submission *s);
 
-/* The command of an image as words with NULL at the end, which live in `text`; threads and seed as given, the
- * output by its name in the rubric. False if it is too long. */
+/* The command of an image as NULL-terminated words, which lie in `text` (size bytes), at most most
+ * - 1 of them; threads and seed as given, the output by its name in the rubric. False if it is too
+ * long. */
 bool submission_command(const struct rubric *r, const struct rubric_image *p, const char *program,
                         uint64_t seed, int threads, char *text, size_t size, const char **argv,
                         int most);

@@ -16,15 +16,16 @@ enum {
     UNPACK = 97,
     NO_PROGRAM = 98,
     BUILD = 99,
-    /* exit statuses of the scripts */ PROBE_S = 10,
+    /* above: exit statuses of the scripts; below: seconds, processes */ PROBE_S = 10,
     FILL_S = 3600,
     BUILD_PROCESSES = 512
 };
 
-/* Unpacks archives, brings the folder of the sources to the top, so that its name plays no part, and takes away what another
- * machine has left there: its CMakeCache.txt stops CMake, its objects would be linked. Files of another time zone
- * may be younger than now, which make(1) takes for built. What is said last is the reason of a failure. The build's objects
- * stay behind: every run unpacks the tree. */
+/* Unpacks archives, moves the folder of the sources to the top, so that its name does not matter,
+ * and removes what another machine left there: its CMakeCache.txt stops CMake, its objects would be
+ * linked. Files from another time zone may be younger than now, which make(1) takes for built. The
+ * last line printed is the reason of a failure. The build's objects are removed, as every run
+ * unpacks the tree. */
 static const char build_script[] =
     "set -u\n"
     "lift() {\n" /* a folder takes the place of everything */
@@ -117,7 +118,7 @@ static void reason_in(const char *log, bool first_error, char *out, size_t size)
                                         "No rule to make", "cannot find ", "ut of memory",
                                         "annot allocate"};
     char line[400];
-    int more = 0; /* lines of CMake's, which says what and then why */
+    int more = 0; /* lines still to append: CMake says what, then why */
     out[0] = '\0';
     FILE *f = fopen(log, "r");
     while (f != NULL && fgets(line, sizeof line, f) != NULL) {
@@ -147,7 +148,7 @@ static void fails(struct submission *s, enum submission_state state, const char 
     snprintf(s->why, sizeof s->why, "It %s: %.500s", what, why);
 }
 
-/* A run that ended for no reason of the program's is no run. */
+/* Runs a job; fails if the run was lost for a reason that is not the program's. */
 static bool run(const struct sandbox *box, const struct submission *s,
                 const struct sandbox_job *job, struct sandbox_result *out, struct err *e)
 {

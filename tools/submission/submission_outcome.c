@@ -1,4 +1,4 @@
-/* What became of a submission's runs, in words: not started, printed its usage, hung; which
+/* What became of a submission's runs, in words (not started, printed its usage, hung), and which
  * images are not worth a try. */
 #include "submission.h"
 
@@ -11,7 +11,7 @@ const char submission_not_made[] = "there is no image, see what is said of all o
 
 enum { CHEAPER = 8, HOPELESS = 3 };
 
-/* In proportion to the time that the image takes, more or less. */
+/* Roughly in proportion to the time that the image takes. */
 static double work_of(const struct rubric_image *p)
 {
     return (double)p->width * p->height * p->spp * (1.0 + (double)p->lights * p->bounces);
@@ -48,7 +48,7 @@ bool submission_will_hang(const struct rubric *r, const struct made *made, int i
     return out->why[0] != '\0';
 }
 
-/* Text of a program, in printable ASCII. */
+/* Copies the first line of a program's text, in printable ASCII. */
 static void take_line(const char *line, char *out, size_t size)
 {
     size_t n = 0;
@@ -66,7 +66,7 @@ bool submission_printed_usage(const char *log, char *why, size_t size)
     for (int i = 0; f != NULL && !usage && i < 200 && fgets(line, sizeof line, f) != NULL; i++) {
         const char *at = line + strspn(line, " \t");
         usage = strncasecmp(at, "usage", 5) == 0 && !isalnum((unsigned char)at[5]);
-        /* What getopt(3) complains of says more. */
+        /* A complaint of getopt(3) says more than the usage text. */
         bool complaint = strstr(at, "option") != NULL || strstr(at, "argument") != NULL;
         if (why[0] == '\0' && (usage || complaint))
             take_line(at, why, size);

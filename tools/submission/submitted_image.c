@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const double clip_sd = 5; /* of the clipping point, where nothing is compared */
+static const double clip_sd = 5; /* standard errors around the clipping point where nothing is compared */
 
 static bool check_header(const char *path, int width, int height, struct image_info *info,
                          struct err *e)
@@ -53,7 +53,7 @@ static void set_code(struct submitted_image *s, size_t i, const struct curve *cu
     s->rounding[i] = k == steps ? 0 : (hi - lo) * (hi - lo) / 12;
 }
 
-/* Half floats are rounded, RGBE may be cut off. */
+/* Width of the bin of a float: half floats are rounded, RGBE may be truncated; 0: exact. */
 static double float_step(const struct image_file *pic, float v, const float *px)
 {
     if (pic->info.type == IMAGE_HALF)
@@ -137,7 +137,8 @@ static void drop_small(struct submitted_image *s)
     s->num_runs = num;
 }
 
-/* The pixels of the 3 x 3 around pixel p that are in the image, itself too; how many. */
+/* at[]: the pixels of the 3 x 3 around p, itself included, that lie in the image; returns their
+ * number. */
 static int neighbours(const struct submitted_image *s, size_t p, size_t at[9])
 {
     int num = 0, x = (int)(p % (size_t)s->width), y = (int)(p / (size_t)s->width);
@@ -328,7 +329,8 @@ double submitted_image_expected_sd(const struct moments *reference, size_t i, do
     return n > 1 ? sqrt(reference->m2[i] / (n - 1) * paths / spp) : 0;
 }
 
-/* Clears use[p] where mark[] is `kind` or more in p or beside it, but not where p itself is `spared`. */
+/* Clears use[p] if p or a neighbour is marked `kind` or more, unless p itself is marked
+ * `spared`. */
 static void clear_around(const struct submitted_image *s, const unsigned char *mark,
                          unsigned char kind, unsigned char spared, unsigned char *use)
 {
@@ -340,7 +342,8 @@ static void clear_around(const struct submitted_image *s, const unsigned char *m
     }
 }
 
-/* A few pixels at the rim of a lamp, or of a caustic, can hold most of an image's noise and all of its skewness. */
+/* Drops pixels of more than 20 times the mean variance: a few at the rim of a lamp or a caustic can
+ * hold most of an image's noise and all of its skewness. */
 static void drop_loudest(const struct submitted_image *s, const struct moments *m, double spp,
                          double *v, unsigned char *use)
 {
@@ -362,7 +365,7 @@ static void drop_loudest(const struct submitted_image *s, const struct moments *
             use[p] = 0;
 }
 
-/* As measured in the pixels around, of the run that has fewest samples. */
+/* Standard error measured from run to run in the 3 x 3 pixels, for the run with fewest samples. */
 static double measured_sd(const struct submitted_image *s, size_t i)
 {
     double sum = 0, least = INFINITY;

@@ -15,7 +15,8 @@
 struct submitted_image {
     int width, height;
     double *mean, *tolerance,
-        *rounding;    /* 3 per pixel: value, how far a whole area may be off, variance */
+        *rounding;    /* 3 per pixel: radiance; half a bin, by which a flat area may be
+                      * off; variance of the rounding */
     double *variance; /* 3 per pixel: expected of the mean, 0 until submitted_image_expect() */
     double *k3;       /* 3 per pixel: third cumulant of the mean, likewise */
     unsigned char *clipped; /* 3 per pixel: at the brightest code */
@@ -24,8 +25,8 @@ struct submitted_image {
     bool known; /* variance is that of the mean itself: of references, not of students' images */
     double spp; /* samples a pixel of all its runs; 0: as many as the rubric asks for */
     double *measured; /* 4 per pixel, R G B luminance: variance of the mean from run to run */
-    double runs_dof;  /* of each of them; 0: there was one run, nothing is measured */
-    struct submitted_image *run; /* what it is the weighted mean of; NULL: one run */
+    double runs_dof;  /* degrees of freedom of each; 0: one run, nothing is measured */
+    struct submitted_image *run; /* runs whose weighted mean it is; NULL: one run */
     int num_runs;
 };
 
@@ -51,7 +52,8 @@ bool submitted_image_same(const struct submitted_image *a, const struct submitte
  * vary. For an image of several runs the spp of each run counts, not the argument. */
 void submitted_image_expect(struct submitted_image *s, const struct moments *m, double spp);
 
-/* Makes an image of the same kind as `like` from m, with the known variance of its mean; m NULL: black. */
+/* Makes an image of the same size and clipping as `like` from m, with the known variance of its
+ * mean; m NULL: black. The caller frees it with submitted_image_free(). */
 NODISCARD bool submitted_image_from(const struct moments *m, const struct submitted_image *like,
                                     struct submitted_image *out, struct err *e);
 
@@ -63,10 +65,12 @@ NODISCARD bool submitted_image_copy(const struct submitted_image *s, struct subm
  * nothing is measured. */
 void submitted_image_model(struct submitted_image *s, double kappa);
 
-/* Scales k3, expected of our samples, to the noise that is measured in each tile: as skewed as ours. */
+/* Scales k3, expected of our samples, to each tile's measured variance, so that skewness stays that
+ * of ours. */
 void submitted_image_scale_skewness(struct submitted_image *s, const unsigned char *use);
 
-/* dst += src, clipped where either is, measured where both are; one made of nothing, black, is. */
+/* dst += src; clipped where either is; runs_dof is the smaller (INFINITY in a black image made from
+ * NULL). */
 void submitted_image_add(struct submitted_image *dst, const struct submitted_image *src);
 
 /* Clears use[p] where s cannot be compared with a render of spp samples per pixel, judged by the
@@ -78,8 +82,8 @@ NODISCARD bool submitted_image_comparable(const struct submitted_image *s, const
                                           double spp, bool measured, unsigned char *use,
                                           struct err *e);
 
-/* The same without a reference: use[p] becomes 0 where s is clipped and beside that, elsewhere
- * nonzero. */
+/* The same without a reference: use[p] becomes 0 where s is clipped and beside such pixels;
+ * elsewhere it stays as it is. */
 void submitted_image_unclipped(const struct submitted_image *s, unsigned char *use);
 
 /* Standard deviation of channel i (3 per pixel) in a render of spp samples, by the reference's samples. */

@@ -13,10 +13,10 @@
 #include <stdio.h>
 #include <string.h>
 
-/* Error rates were measured from 16 samples on; an engine's start costs more than a few replicates. */
+/* Error rates were measured for 16 samples or more; starting an engine costs more than a few replicates. */
 enum { LEAST_SAMPLES = 16, LEAST_REPLICATES = 8 };
 
-/* Where the fresh stream begins: another seed of ours, and replicates that no first stream reaches. */
+/* Seeds of the second stage: another seed for our renders, and replicate numbers that the first stage never reaches. */
 static const uint64_t fresh_seed = 0xd1b54a32d192ed03u;
 enum { FRESH_REPLICATE = 1 << 24 };
 
@@ -34,7 +34,7 @@ void side_free(struct side *s)
             observed_free(&s->at[k][l]);
 }
 
-/* Ways of ours whose samples cannot be taken in parts. */
+/* Is it a variant of our renderer whose samples cannot be rendered in parts? */
 static bool is_whole(const struct suite_variant *v)
 {
     static const char *const whole[] = {"-a",        "--adaptive", "--adaptive-unbiased",
@@ -88,7 +88,7 @@ int side_count(const struct side *s, int look)
     return 1;
 }
 
-/* Where a look's image is kept: looks of as many observations share it. */
+/* Index of a look's image: looks with equally many observations share one. */
 static int slot(const struct side *s, int look)
 {
     int n = side_count(s, look), l = look;
@@ -97,7 +97,7 @@ static int slot(const struct side *s, int look)
     return l;
 }
 
-/* The largest look of fewer observations that is there, or -1. */
+/* The largest look with fewer observations whose image is present, or -1. */
 static int below(const struct side *s, int stage, int look)
 {
     int l = slot(s, look) - 1;
@@ -117,7 +117,7 @@ double side_cost(const struct side *s, int look)
     return n * samples * s->scene->width * s->scene->height;
 }
 
-/* data/scene/name[_filter][_fresh][_n] */
+/* The path without ending, in out_dir: data/SCENE/NAME[_filter][_fresh][_OBSERVATIONS]. */
 static struct path stem_of(const struct validation *v, const struct side *s, int stage, int look)
 {
     char n[16] = "";
@@ -138,7 +138,8 @@ static double program_time(const struct validation *v)
     return fmin(v->opt->timeout_s, validate_time_left(v));
 }
 
-/* Samples first .. last-1. The only look of a run leaves the renderer's own file. */
+/* Renders the samples from `first` up to those of the look. If a run has a single look, the renderer's own file
+ * stays. */
 static bool render_ours(const struct validation *v, const struct side *s, int stage, int look,
                         int first, struct side_image *out, struct err *e)
 {
@@ -194,8 +195,8 @@ static bool render_engine(const struct validation *v, const struct side *s, int 
     return fs_make_parent_dirs(path.s, e) && json_write(path.s, out->manifest, e);
 }
 
-/* `more` becomes the sum of `before` and itself, or a copy of `before` if it has no image. The manifest is that of `before`,
- * with all seeds. */
+/* Adds `before` to `more`, or copies it if `more` has no image. The manifest becomes that of `before`, with the
+ * seeds of both. */
 static bool add_before(const struct side_image *before, struct side_image *more, struct err *e)
 {
     struct moments sum;
@@ -220,7 +221,8 @@ static bool add_before(const struct side_image *before, struct side_image *more,
     return true;
 }
 
-/* Stored by an engine with a description, which names its filter, or by one that has the box of one pixel. */
+/* Was the reference stored with the scene's pixel filter? The manifest's "description" names it; else it is the box
+ * of one pixel. */
 static bool has_filter_of(const struct side *s, const json_t *manifest, struct err *e)
 {
     const char *stored =
@@ -240,7 +242,7 @@ static bool make(struct validation *v, struct side *s, int stage, int look, stru
     int l = below(s, stage, look);
     int first = l >= 0 ? side_count(s, l) : 0;
     const struct side_image *before = l >= 0 ? &s->at[stage][l] : NULL;
-    /* An engine without noise has no more to say. */
+    /* More replicates of an engine without noise would be the same image. */
     if (before != NULL && (first == side_count(s, look) || strcmp(before->m.unit, "exact") == 0))
         return add_before(before, out, &s->e);
     bool ok = false;
@@ -287,7 +289,7 @@ enum fetch_result side_at(struct validation *v, struct side *s, int stage, int l
     double begun = progress_seconds();
     if (!make(v, s, stage, look, o)) {
         observed_free(o);
-        /* A program that was stopped because the time is over has done nothing wrong. */
+        /* A program that was stopped because the budget is spent has not failed. */
         if (validate_time_left(v) <= 0)
             return FETCH_NO_TIME;
         s->failed = true;

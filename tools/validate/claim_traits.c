@@ -35,7 +35,7 @@ enum {
     TILE_SIDE = 16
 };
 
-/* Of those that are no features. */
+/* Texts of the traits that are not features. */
 static const char *const trait_texts[NUM_FIXED] = {
     [TRAIT_SPECULAR] = "a mirror, glass or refraction",
     [TRAIT_BOUNDARY] = "glass or refraction",
@@ -59,7 +59,7 @@ static const char *const trait_texts[NUM_FIXED] = {
     [TRAIT_LOOKAT] = "<lookat> in its file",
 };
 
-/* What classes stand for. */
+/* The features that make up each class. */
 static const struct {
     int trait;
     unsigned of;
@@ -76,7 +76,7 @@ static uint64_t bit(int trait)
     return (uint64_t)1 << trait;
 }
 
-/* Of a reference or a variant. Those beyond the last that has room are not told apart. */
+/* The bit of a reference or a side, a new one if need be; 0 without a name or once all bits are used. */
 static uint64_t named_trait(struct traits *t, const char *what, const char *name)
 {
     char full[sizeof *t->name];
@@ -162,7 +162,8 @@ static bool is_wrongly_different(const json_t *claim)
            is_verdict(claim, "verdict", VERDICT_DIFFERENT);
 }
 
-/* If any of these rows differs, all of them as claims of sides of their own: PROGRAM-KIND, the program in `key`. */
+/* If any row differs, appends all of them to `all` as claims of the side PROGRAM-KIND, the program being member
+ * `key`. */
 static void add_sides(json_t *all, const json_t *rows, const char *key, const char *kind)
 {
     bool differs = false;
@@ -180,7 +181,7 @@ static void add_sides(json_t *all, const json_t *rows, const char *key, const ch
     }
 }
 
-/* With those of consistency and of noise. */
+/* The claims, with those made of stated errors and of noise. A new reference. */
 static json_t *all_claims(const json_t *results)
 {
     json_t *all = json_array(), *noise = noise_results_claims(json_object_get(results, "noise"));
@@ -191,7 +192,7 @@ static json_t *all_claims(const json_t *results)
     return all;
 }
 
-/* The program that most claims that differ are about: "pathtracer" of "pathtracer-adaptive". */
+/* The program with most claims that wrongly differ, *length characters: "pathtracer" of "pathtracer-adaptive". */
 static const char *accused(const json_t *claims, size_t *length)
 {
     const char *best = "";

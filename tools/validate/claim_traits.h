@@ -1,5 +1,5 @@
-/* What the scenes of a validation's claims have, a bit each: a feature of features.h, a class of several, the number of
- * bounces, the shape of the image, the transforms in the file, a side, a reference. */
+/* Traits of a validation's claims, a bit each: a feature of the scene (features.h) or a class of several, number of
+ * bounces, shape of the image, transforms in the scene file, the tested side, the reference. */
 #ifndef ASSAY_CLAIM_TRAITS_H
 #define ASSAY_CLAIM_TRAITS_H
 
@@ -18,17 +18,17 @@ struct claim_traits {
 };
 
 struct traits {
-    char name[MAX_TRAITS][128]; /* as in "claims that differ have NAME" */
+    char name[MAX_TRAITS][128]; /* completes "claims that differ have .." */
     int num;
     struct claim_traits *claim;
     int num_claims, num_differ;
     json_t *json; /* of the claims: owns the texts */
 };
 
-/* Collects claims of results.json that should be EQUIVALENT, came out EQUIVALENT or DIFFERENT, and are
- * about one program: that of most claims that differ. Claims of consistency (a: "PROGRAM-consistency")
- * are among them if one of those differs. If no claim differs, there are none, and the suite is not
- * opened. The caller calls claim_traits_free(). */
+/* Collects the claims of results.json that should be EQUIVALENT and came out EQUIVALENT or DIFFERENT, of the
+ * one program with most claims that differ. Stated errors ("PROGRAM-consistency" for a) and noise
+ * ("PROGRAM-noise") are included if one of their kind differs. If no claim differs, there are none, and the
+ * suite is not opened. The caller calls claim_traits_free(). */
 NODISCARD bool claim_traits_collect(const json_t *results, const char *suite_dir,
                                     struct traits *out, struct err *e);
 void claim_traits_free(struct traits *t);

@@ -62,7 +62,8 @@ static void pair_free(struct pair *p)
     input_free(&p->in[1]);
 }
 
-/* Sides that share their noise: what they say of it is not that of A - B, which is looked at itself. */
+/* For sides that share their noise: drops their stated variances, which are not that of A - B; input_pair() then
+ * estimates it from A - B itself. */
 static void make_pairs(struct pair *p, struct notes *notes)
 {
     struct moments *m[2] = {&p->in[0].m, &p->in[1].m};
@@ -83,7 +84,7 @@ static void make_pairs(struct pair *p, struct notes *notes)
                                 : "--paired: the noise is that of A - B, whatever the sides state");
 }
 
-/* A side as the threads that read them leave it. */
+/* What the threads that read the two sides share. */
 struct reading {
     const struct compare_job *job;
     const char *const *path;
@@ -123,7 +124,7 @@ static bool pair_read(const struct compare_job *job, const char *const path[2],
             input_notes_add(notes, "%s", r.notes[i].line[k]);
         ok = r.ok[i] || err_set(e, "%s", r.err[i].msg);
     }
-    for (int i = 0; ok && i < 2; i++) /* a curve that nothing is decoded by is a mistake */
+    for (int i = 0; ok && i < 2; i++) /* a curve that decodes nothing is a mistake */
         ok = job->input[i].curve == NULL || p->in[0].censored != NULL ||
              p->in[1].censored != NULL ||
              err_set(e, "--curve is for images of integers, neither %s nor %s is one", path[0],
@@ -136,7 +137,7 @@ static bool pair_read(const struct compare_job *job, const char *const path[2],
     return ok;
 }
 
-/* The pair's moments become the result's; what is left of it is freed. */
+/* Moves the pair's moments into the result and frees the rest of the pair. */
 static void keep_pair(const char *const path[2], const struct input_memory *const memory[2],
                       struct pair *p, struct compared *out)
 {
@@ -219,7 +220,7 @@ static bool same_image(const struct replicate_dir *r, const struct replicate_dir
                    s->name != NULL ? s->name[j] : "one of it");
 }
 
-/* Its replicates; those in memory stay whose they are. */
+/* Reads a directory of replicates, or borrows those in memory. */
 static bool replicates_read(const char *path, const struct input_memory *memory,
                             struct replicate_dir *out, struct err *e)
 {
@@ -297,7 +298,7 @@ void compare_job_free(struct compared *c)
     moments_free(&c->m[1]);
 }
 
-/* The flips decide; what the means alone say stands beside it, if they can be compared. */
+/* The sign flips decide; the verdict of the means is kept beside theirs, if the means can be compared. */
 static bool run_same_program(const struct compare_job *job, struct compared *out, struct err *e)
 {
     struct sign_flip_options opt = {job->opt.alpha, job->filter_width, job->opt.tile};
@@ -329,7 +330,7 @@ static bool run_same_program(const struct compare_job *job, struct compared *out
     return true;
 }
 
-/* Nothing was found, but more than is accepted could have been missed. */
+/* NO DIFFERENCE FOUND, but with MDBs above those accepted: says so, and sets the factor of samples that would do. */
 static void tell_accepted(const struct compare_job *job, struct comparison *r)
 {
     const double *accept = job->accept_mdb;
@@ -383,7 +384,8 @@ static json_t *same_program_json(const struct compared *c, int filter_width)
                      "reason", c->mean_reason);
 }
 
-/* The report reads moments: of a side that is none, they are written beside the results. */
+/* The file of a side for the report, which reads moments: of a side that is not a moments EXR they are written
+ * beside the results. */
 static bool side_file(const struct compared *c, int side, const char *json, struct path *out,
                       struct err *e)
 {

@@ -15,7 +15,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Takes over the value, which may be NULL. */
+/* Appends an option and its value, which may be NULL; takes ownership of it. */
 static void add_option(json_t *words, const char *option, json_t *value)
 {
     json_array_append_new(words, json_string(option));
@@ -23,14 +23,14 @@ static void add_option(json_t *words, const char *option, json_t *value)
         json_array_append_new(words, value);
 }
 
-/* Where it is not the one that is found without being named. */
+/* Appends a path option, unless the path is the default. */
 static void add_place(json_t *words, const char *option, const char *place, struct path found)
 {
     if (place != NULL && strcmp(place, found.s) != 0)
         add_option(words, option, json_string(place));
 }
 
-/* The command that judges this claim alone, and yet with the same alpha; to free(). NULL: out of memory. */
+/* The command that judges this claim alone with the alpha that it has here, to free(); NULL: out of memory. */
 static char *rerun_command(const struct validation *v, const struct claim_run *t)
 {
     const struct validate_options *o = v->opt;
@@ -137,14 +137,14 @@ static json_t *files_of(const struct validation *v, const struct claim_run *t, s
     return files;
 }
 
-/* The claim of noise may want a closed form, too. */
+/* Frees a side after its last claim, unless it is a closed form, which the claim of noise may need, too. */
 static void release(struct side *s)
 {
     if (--s->users == 0 && s->kind != SIDE_TRUTH)
         side_free(s);
 }
 
-/* How it was looked at, at what cost. */
+/* Adds the looks, what they spent of alpha, and the CPU time of both sides. */
 static void add_looks(json_t *claim, const struct validation *v, const struct claim_run *t)
 {
     double spent = 0;
@@ -157,7 +157,7 @@ static void add_looks(json_t *claim, const struct validation *v, const struct cl
     json_object_set_new(claim, "cost_s", json_pack("{sf,sf}", "a", t->cpu_a, "b", t->cpu_b));
 }
 
-/* Of several rows the first that did not pass, else the first. */
+/* The row to announce: of several the first that did not pass, else the first. */
 static const json_t *row_to_tell(const json_t *result)
 {
     for (size_t i = 0; i < json_array_size(result); i++)
@@ -194,7 +194,7 @@ static void announce(struct validation *v, struct claim_run *t)
     }
 }
 
-/* The claim is what the last look said; why, if not NULL, comes before its reason. */
+/* Ends the claim with the verdict of its last look; why, unless NULL, is put before its reason. */
 static void finish(struct validation *v, struct claim_run *t, const char *why)
 {
     char *rerun = rerun_command(v, t), reason[512];
@@ -244,7 +244,7 @@ struct pair {
     struct claim_run *t;
     bool no_time;
     struct side_image *image[2]; /* of the last stage */
-    /* Of it, where one side is an image of whose noise nothing is known: copies, with the noise of A - B. */
+    /* If a side is a single image without known noise: copies of both, with noise estimated from A - B. */
     bool is_estimated;
     struct moments estimated[2];
 };
@@ -260,7 +260,8 @@ static bool has_no_noise(const struct moments *m)
     return strcmp(m->unit, "picture") == 0;
 }
 
-/* The same bits, as of a program without seeds that has not changed, have no noise in A - B. */
+/* Copies both means and estimates their noise from A - B; images that are the same to the bit (an unchanged program
+ * without seeds) count as exact. */
 static bool estimate(struct pair *p, struct err *e)
 {
     struct noise_estimate found;
@@ -311,7 +312,7 @@ static bool both_of(void *ctx, int stage, const struct moments **a, const struct
     return true;
 }
 
-/* The share of a in the variance of the difference, all pixels and channels together. */
+/* The share of side a in the variance of the difference, summed over pixels and channels. */
 static double noise_share(const struct claim_run *t)
 {
     double sum[2] = {0, 0};
@@ -324,7 +325,7 @@ static double noise_share(const struct claim_run *t)
     return sum[0] + sum[1] > 0 ? sum[0] / (sum[0] + sum[1]) : 1;
 }
 
-/* Below this, more samples of ours are lost on a reference that stays as it is. */
+/* Below this share of our noise, more samples of ours gain nothing against a stored reference. */
 static const double least_noise_share = 0.1;
 
 static void look(struct validation *v, struct claim_run *t)
@@ -371,7 +372,7 @@ static void look(struct validation *v, struct claim_run *t)
         finish(v, t, "the noise left is that of the stored reference");
 }
 
-/* What renders for itself. */
+/* Judges a claim that renders for itself: stated errors or noise. */
 static void judge_alone(struct validation *v, struct claim_run *t, double deadline)
 {
     const struct scene_sides *s = &v->sides[t->scene - v->suite.scene];

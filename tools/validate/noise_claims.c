@@ -1,4 +1,4 @@
-/* Claims about noise: the variance of a sample and its fall, against closed forms or records. */
+/* Claims about noise: the variance of a sample and the slope of the error, against closed forms or records. */
 #include "validate_internal.h"
 
 #include "noise_ladder.h"
@@ -12,34 +12,34 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Where a record says that they can be had: the margin of what is stated; half widths of slopes, and from where on a slope is not
- * asked for. */
+/* Least margins, taken where the record shows that they can be reached: of stated errors, and (a half width) of the
+ * slope; and the half width above which the slope is not judged. */
 static const double stated_margin = 0.05, slope_margin = 0.1, most_slope = 0.5;
-/* Shares of the scene's alpha. A claim of two sides has its share on each. */
+/* Shares of the scene's alpha. A two-sided claim spends half of its share on each side. */
 static const double image_share = 0.25, tile_share = 0.25, other_share = 0.125;
-/* Seeds of replicates that no other claim of the scene has. */
+/* The first replicate's number: its seeds occur in no other claim of the scene. */
 enum { FIRST_SEED = 1 << 20 };
 
-/* What a row says, most of it known of some engines alone. */
+/* The contents of a row; some parts are known for some engines only. */
 struct row {
     const struct suite_scene *scene;
     const char *engine;
     double alpha;     /* of the scene */
-    const char *what; /* is judged */
+    const char *what; /* the quantity judged, for the reason */
     const struct noise_ladder *ladder;
     bool timed; /* in this run, on this machine */
     const char *against;
     struct variance_claim image, tile, stated;
-    int worst; /* tile of the claim */
+    int worst; /* index of the tile in `tile` */
     struct estimate slope;
     double slope_margin; /* 0: not judged */
-    bool both;           /* a claim of two sides */
+    bool both;           /* the claim of the variance is two-sided */
     bool has_slope, has_stated, has_tiles;
     bool tiles_inside; /* the estimates of all of them are within their margins */
     enum verdict slope_verdict;
 };
 
-/* Of V: of its logarithm where it has one. */
+/* The interval of V, from that of its logarithm; null without noise, or if it spans a factor of e^20. */
 static json_t *variance_ci(struct estimate v, double alpha)
 {
     if (v.value <= variance_ladder_none)
@@ -111,7 +111,7 @@ static void tell_claim(const struct variance_claim *c, const char *what, const c
              c->ratio, c->lo, c->hi, of, c->margin);
 }
 
-/* The first that differs, else the first that is undecided, and why. */
+/* The row's verdict and its reason: those of the first claim that differs, else of the first that is undecided. */
 static enum verdict overall(const struct row *r, char reason[256])
 {
     char of_tile[64];
@@ -167,7 +167,7 @@ static json_t *judged_row(const struct row *r)
     return j;
 }
 
-/* Of a record's observations: what this look has, and what all looks would have, which says the margin. */
+/* Observations over those of the record: at this look, and with NOISE_REPLICATES, for which margins are set. */
 struct shares {
     double seen, all;
 };
@@ -183,8 +183,8 @@ static bool is_inside(const struct variance_claim *c, bool both)
            (!both || c->ratio >= 1 / (1 + c->margin));
 }
 
-/* Every tile of which something can be said; keeps the one furthest out. A tile can be found to differ, no more: its few
- * pixels may know their own uncertainty too badly to say anything else. */
+/* Judges every tile and keeps the one furthest out. A tile can only be found to differ: the standard error of its few
+ * pixels may be too poorly known for EQUIVALENT. */
 static void judge_tiles(const struct noise_ladder *run, const struct variance_map *wanted,
                         const struct variance_map *record, const struct shares *share, bool both,
                         double alpha, struct row *r)
@@ -209,7 +209,8 @@ static void judge_tiles(const struct noise_ladder *run, const struct variance_ma
     }
 }
 
-/* The variance between renders of n samples over that within, over n: all rungs, weighted as for a slope. */
+/* The variance of a sample as seen between renders: n times the variance of a render of n samples, a weighted mean
+ * of its logarithm over all rungs (weights as for a slope). */
 static struct estimate stated_error(const struct noise_ladder *l)
 {
     double mean = 0, sw = 0, sum = 0, var = 0, dof = INFINITY;
@@ -227,7 +228,7 @@ static struct estimate stated_error(const struct noise_ladder *l)
     return (struct estimate){value, value * sqrt(var) / sw, dof};
 }
 
-/* The slope, and the half width that the record says can be had. */
+/* The slope, and the half width that it can have according to the record. */
 static void judge_slope(const struct noise_ladder *run, const struct noise_ladder *record,
                         struct row *r)
 {
@@ -241,7 +242,7 @@ static void judge_slope(const struct noise_ladder *run, const struct noise_ladde
     r->slope = variance_ladder_expect(r->slope, was, share.seen);
 }
 
-/* By the record, or by a closed form, where the record only says which margins can be had. */
+/* Judges against the record, or against a closed form; then the record only sets the margins. */
 static void judge_independent(const struct noise_ladder *run, const struct variance_map *wanted,
                               const struct noise_ladder *record, bool both, struct row *r)
 {
@@ -265,7 +266,7 @@ static void judge_independent(const struct noise_ladder *run, const struct varia
     r->stated = variance_ladder_judge(is, v, margin, true, a * other_share / 2);
 }
 
-/* Of stratified samples: the last rung against that of the record, and a slope of -1/2 at most. */
+/* Judges stratified samples: the variance of the last rung against the record, and a slope of at most -1/2. */
 static void judge_sobol(const struct noise_ladder *run, const struct noise_ladder *record,
                         struct row *r)
 {
@@ -285,7 +286,7 @@ static void judge_sobol(const struct noise_ladder *run, const struct noise_ladde
                                                         : VERDICT_INCONCLUSIVE;
 }
 
-/* The closed form as something without error. *has: there is one. */
+/* The closed form of the variance of a sample, as estimates without error, if there is one (*has). */
 static bool closed_form(const struct suite_scene *s, const struct converge_reference *unit,
                         const struct variance_map *like, struct variance_map *out, bool *has,
                         struct err *e)
@@ -322,9 +323,10 @@ static bool closed_form(const struct suite_scene *s, const struct converge_refer
 
 static const char *const ours[2] = {"pathtracer", "pathtracer-sobol"};
 
-/* Whether all replicates would say nothing else: something differs, or what can be shown to be the same is shown, and the rest,
- * which can only be found to differ, has its estimate inside its margin. What all would find lies z > 4.8 of their standard
- * errors beyond it, so that of half of them it is inside with a chance of Phi(-z/sqrt 2) < 4e-4. */
+/* Would more replicates change nothing? So it is if something differs, or if all that can be shown to be the same
+ * has been shown and the estimates of the rest, which can only be found to differ, lie inside their margins. A
+ * deviation that all replicates would find lies z > 4.8 of their standard errors beyond its margin; with half of
+ * them its estimate is inside with a probability of Phi(-z/sqrt 2) < 4e-4. */
 static bool is_decided(const struct row *r)
 {
     char reason[256];
@@ -336,7 +338,7 @@ static bool is_decided(const struct row *r)
             (r->slope_margin <= 0 || r->slope_verdict == VERDICT_EQUIVALENT));
 }
 
-/* One look with one sampler, at so many replicates; *row is what it says. */
+/* One look at one sampler with that many replicates. *row: the judged row, a new reference. */
 static bool look(const struct noise_job *job, int replicates, struct noise_renders *renders,
                  const struct noise_ladder *record, double alpha, bool *decided, json_t **row,
                  struct err *e)
@@ -366,12 +368,12 @@ static bool look(const struct noise_job *job, int replicates, struct noise_rende
     return ok;
 }
 
-/* Replicates at each look, which have equal parts of alpha: half of those of the margins, all of them, and for what is still not
- * decided twice as many, since a few rare events can hide how noisy the others are. */
+/* Replicates at each look (looks share alpha equally): half of those that margins are set for, all of them, and, if
+ * still undecided, twice as many, since a few rare events can mask how noisy the rest is. */
 enum { LOOKS = 3 };
 static const int looks[LOOKS] = {NOISE_REPLICATES / 2, NOISE_REPLICATES, 2 * NOISE_REPLICATES};
 
-/* Renders with one sampler and judges it by its record. */
+/* Renders with one sampler, judges it, and appends its row. */
 static bool judge_ours(const struct noise_job *job, const json_t *stored, double alpha,
                        json_t *rows, struct err *e)
 {
@@ -397,8 +399,8 @@ static bool judge_ours(const struct noise_job *job, const json_t *stored, double
     return ok || err_prefix(e, "%s", engine);
 }
 
-/* What is stored of another engine: measured, and judged by nothing. Its time counts where that of ours was taken in the
- * same run. */
+/* The row of another engine, as stored: measured, not judged. Its efficiency is given only if ours was timed by the
+ * same command. */
 static json_t *stored_row(const struct suite_scene *s, const char *engine, const json_t *stored,
                           double alpha)
 {

@@ -71,7 +71,7 @@ static bool render_rung(const struct noise_job *job, int rung, int first, int nu
     const struct path files = fs_path("%s/noise", job->dir);
     uint64_t seed[MAX_SEEDS];
     for (int i = 0, k = first; i < num; i++, k++) {
-        /* Batches of replicates, so that more of them leave the seeds of the first as they are. */
+        /* Numbered in batches, so that rendering more replicates does not change the seeds of the first ones. */
         int batch = k / NOISE_REPLICATES * 2 * NOISE_RUNGS + job->sobol * NOISE_RUNGS + rung;
         int number = batch * NOISE_REPLICATES + k % NOISE_REPLICATES;
         seed[i] = replicate_seed(job->seed, (int)job->first + number);
@@ -108,7 +108,7 @@ static bool begin(const struct noise_job *job, struct noise_renders *r, struct e
     return (ok && (job->sobol || r->last != NULL)) || err_set(e, "out of memory");
 }
 
-/* The next replicates of every rung, up to `count` of them. */
+/* Renders the next replicates of every rung, up to replicate `count` and at most MAX_SEEDS at once. */
 static bool climb(const struct noise_job *job, int count, struct noise_renders *r, struct err *e)
 {
     const size_t size = job->unit->size;
@@ -144,7 +144,7 @@ bool noise_ladder_render(const struct noise_job *job, int count, struct noise_re
     for (int i = 0; ok && i < NOISE_RUNGS; i++)
         ok = noise_ladder_add(out, r->images[i], noise_ladder_spp[i], r->cpu_s[i] / count,
                               job->unit, width, tile, e);
-    if (ok && !job->sobol) { /* the last rung also tells the variance of a sample */
+    if (ok && !job->sobol) { /* the last rung also gives the variance of a sample */
         variance_map_free(&out->sample);
         out->n = (double)count * NOISE_TOP;
         ok = variance_ladder_within(r->last, count, job->unit, tile, &out->sample, e);
@@ -167,7 +167,7 @@ bool noise_ladder_is_silent(const struct noise_ladder *l)
     return true;
 }
 
-/* As convergence_rate.h has rungs, of those with noise; its slope is that of whatever stands for the squared error. */
+/* The rungs with noise as rungs of convergence_rate.h, with the variance in place of the squared error. */
 static int as_rungs(const struct noise_ladder *l, struct rung out[NOISE_RUNGS])
 {
     int num = 0;
@@ -210,7 +210,7 @@ bool noise_ladder_efficiency(const struct noise_ladder *l, struct estimate *log_
     return isfinite(log_efficiency->value);
 }
 
-/* Five digits: more would be noise, and take room. */
+/* Rounded to five digits: more would be noise and waste space. */
 static json_t *short_number(double v)
 {
     char text[32];

@@ -22,7 +22,7 @@ static struct pathtracer_rays read_rays(const struct image *im)
     return (struct pathtracer_rays){0};
 }
 
-/* The program with these seeds, as it takes them. */
+/* Runs the program; seed: one seed or several, separated by commas. */
 static bool run(const struct pathtracer_job *job, const char *seed, double timeout_s, double *cpu_s,
                 struct err *e)
 {

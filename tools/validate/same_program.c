@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <sys/stat.h>
 
-/* `all`: those of a directory or in memory, one image's, or one side's means. */
+/* The renders of a side. all: borrowed from memory, or from one of the members below, which are owned. */
 struct renders {
     struct replicate_dir all, dir;
     struct image_file file;
@@ -57,7 +57,8 @@ static bool renders_read(const char *path, const struct input_memory *memory, st
     return ok;
 }
 
-/* Both must have been asked for the same: where each side has one number of samples in all pixels, that is it. */
+/* Both sides must have been asked for equally many samples. That is known only if each has the same number in all
+ * pixels; else (adaptive sampling) nothing is checked. */
 static bool check_samples(const struct moments *m, struct err *e)
 {
     double first[2] = {moments_n(&m[0], 0), moments_n(&m[1], 0)},
@@ -72,7 +73,7 @@ static bool check_samples(const struct moments *m, struct err *e)
                                    n[0], n[1]);
 }
 
-/* Of A - B, from what both say of their own. NULL: out of memory. */
+/* Standard errors of A - B from those that both sides state, 3 per pixel, to free(); NULL: out of memory. */
 static float *stated_error(const struct moments *m)
 {
     size_t values = 3 * (size_t)m->width * (size_t)m->height;
@@ -80,7 +81,7 @@ static float *stated_error(const struct moments *m)
     for (size_t i = 0; error != NULL && i < values; i++) {
         double v = moments_var_of_mean(&m[0], i / 3, (int)(i % 3)) +
                    moments_var_of_mean(&m[1], i / 3, (int)(i % 3));
-        error[i] = v > 0 ? (float)sqrt(v) : 0; /* not a number where it is not known */
+        error[i] = v > 0 ? (float)sqrt(v) : 0; /* 0 also where v is NaN: not known */
     }
     return error;
 }

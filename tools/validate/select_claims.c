@@ -1,5 +1,5 @@
-/* Which claims a run has: every scene with every side, variants, consistency and noise, less
- * what --only leaves out. */
+/* The claims of a run: of every scene all pairs of sides, variants, stated errors and noise, without
+ * those that --only excludes. */
 #include "noise_ladder.h"
 #include "validate_internal.h"
 
@@ -60,7 +60,7 @@ static bool check_scenes(const struct validation *v, struct err *e)
     return true;
 }
 
-/* Each SCENE/CLAIM has to be one of the tasks, which are all those of the scenes. */
+/* Checks that each SCENE/CLAIM of --only is one of the tasks, which still are all of those scenes. */
 static bool check_claims(const struct validation *v, struct err *e)
 {
     for (int i = 0; i < v->opt->num_only; i++) {
@@ -81,7 +81,7 @@ static bool check_claims(const struct validation *v, struct err *e)
     return true;
 }
 
-/* Leaves those of the tasks that were asked for. */
+/* Removes the tasks that --only does not name. */
 static void keep_selected(struct validation *v)
 {
     int kept = 0;
@@ -105,7 +105,7 @@ static void keep_selected(struct validation *v)
     v->num_tasks = kept;
 }
 
-/* Which of the selected scenes the further engine can express; appends the others to `cannot`. */
+/* Sets can[i] for the selected scenes that the further engine can express; appends the others to `cannot`. */
 static bool ask_engine(const struct validation *v, bool *can, json_t *cannot, struct err *e)
 {
     const struct validate_options *o = v->opt;
@@ -137,7 +137,7 @@ static enum side_kind kind_of(const struct validation *v, const struct suite_ref
                                                     : SIDE_GOLDEN;
 }
 
-/* Can this reference be had with the scene's filter? */
+/* Is the reference available with the scene's pixel filter? Else why may say the reason. */
 static bool is_filtered(const struct validation *v, const struct suite_scene *s,
                         const struct suite_reference *ref, struct err *why)
 {
@@ -151,11 +151,13 @@ static bool is_filtered(const struct validation *v, const struct suite_scene *s,
     case SIDE_ENGINE: return true;
     case SIDE_GOLDEN: break;
     }
-    /* Cycles' and POV-Ray's have the box of one pixel; any other says how it was made, to make() in claim_side.c. */
+    /* Goldens of Cycles and POV-Ray have the box of one pixel; those of others name their filter, which make() in
+     * claim_side.c checks. */
     return engine_driver_of(ref->engine) == NULL;
 }
 
-/* Of all scenes, so that each part of a run says the same. */
+/* Sets up what the engine with a filter is compared with, for all scenes, so that every part of a run reports the
+ * same. */
 static void init_peers(struct validation *v)
 {
     v->left_out = json_object();
@@ -204,7 +206,7 @@ static void init_sides(struct validation *v)
     }
 }
 
-/* Counts are by the scene file and the options alone, so which looks there are is fixed beforehand. */
+/* Counts depend on the scene file and the options alone, so the looks are fixed beforehand. */
 void claim_next_look(struct claim_run *t)
 {
     for (; t->next < NUM_LOOKS; t->next++) {
@@ -218,7 +220,7 @@ void claim_next_look(struct claim_run *t)
     }
 }
 
-/* v's looks, if the other side can follow at other sizes than the declared one. */
+/* The run's looks, if one side can grow and the other has an image at any look; else a single one. */
 static const struct alpha_spending *looks_of(const struct validation *v, const struct side *a,
                                              const struct side *b)
 {
@@ -233,7 +235,7 @@ static void add_task(struct validation *v, const struct suite_scene *s, struct s
     struct claim_run *t = &v->task[v->num_tasks++];
     const struct engine *en = v->opt->engine;
     bool widens = a->kind == SIDE_ENGINE && expected == VERDICT_EQUIVALENT;
-    /* One noisy image is the same each time. */
+    /* A program that renders a single image without seeds gives the same again. */
     bool same_again = a->kind == SIDE_ENGINE && en->output == OUTPUT_NOISY;
     bool can_be_fresh = side_can_be_fresh(a) && side_can_be_fresh(b) && !same_again;
     *t = (struct claim_run){.scene = s,
@@ -253,9 +255,9 @@ static void add_task(struct validation *v, const struct suite_scene *s, struct s
     claim_next_look(t);
 }
 
-/* In the order of the results, of a suite of ours: ours against each reference; each engine against the closed form, where
- * there is one: the probes that show the engine to be set up right; a further engine against all of
- * these and ours; variants; consistency; noise. */
+/* Adds a scene's tasks in the order of the results. Of our suite: our renderer against each reference; each engine
+ * against the closed form, if there is one (probes that the engine is set up right); the further engine against all
+ * of these and ours; our variants; stated errors; noise. */
 static void add_scene(struct validation *v, const struct suite_scene *s, bool engine_can,
                       bool of_noise)
 {
@@ -268,7 +270,7 @@ static void add_scene(struct validation *v, const struct suite_scene *s, bool en
     const struct suite_reference *truth = suite_reference_of(s, "truth");
     struct suite_reference self = {.engine = "pathtracer", .fidelity = "exact"};
     int t = truth != NULL ? (int)(truth - s->reference) : 0;
-    if (v->suite.is_own) { /* it is about the engine alone */
+    if (v->suite.is_own) { /* a suite of one's own judges the engine alone */
         for (int i = 0; engine_can && i < s->num_references; i++)
             if (peer[i].scene != NULL)
                 add_task(v, s, &own->engine, &peer[i], &s->reference[i], s->expect);
@@ -283,14 +285,14 @@ static void add_scene(struct validation *v, const struct suite_scene *s, bool en
         const struct suite_reference *ref = &s->reference[i];
         if (peer[i].scene != NULL)
             add_task(v, s, &own->engine, &peer[i], ref, s->expect);
-        /* Against ours inside the widest margins. */
+        /* Against ours the widest margins of any reference hold. */
         self.margin_global = fmax(self.margin_global, ref->margin_global);
         self.margin_tile = fmax(self.margin_tile, ref->margin_tile);
     }
-    if (engine_can) /* of the same scene, also 9x */
+    if (engine_can) /* ours renders the same scene: equal in scenes 9x, too */
         add_task(v, s, &own->engine, filtered ? &own->peer_ours : &own->ours, &self,
                  VERDICT_EQUIVALENT);
-    /* Our other ways to the same image, against the closed form or else the first reference. */
+    /* Variants of our renderer, against the closed form or else the first reference. */
     for (int i = 0; i < s->num_variants; i++) {
         struct suite_reference ref = s->reference[t];
         ref.margin_global = s->variant[i].margin_global;

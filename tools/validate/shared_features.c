@@ -8,12 +8,12 @@
 
 enum { MOST_KEPT = 16, MOST_TOLD = 3, MOST_NAMED = 6, FEW_SCENES = 6 };
 
-/* By how much another place to look may be less likely and still be told. */
+/* The largest ratio of likelihoods at which a less likely place is still reported. */
 static const double tie = 20;
-/* Chance that a claim without the feature differs. */
+/* Probability that a claim without the trait differs. */
 static const double astray = 1e-3;
 
-/* Where it may be wrong: all that has both traits, which may be the same; no trait: everywhere. */
+/* A place where the mistake may be: all claims with one trait or two (bits); none: all claims. */
 struct place {
     uint64_t bits;
     double log_likelihood;
@@ -29,8 +29,9 @@ static bool has(const struct claim_traits *c, uint64_t bits)
     return (c->bits & bits) == bits;
 }
 
-/* A claim of the place differs with a chance of which nothing is known: integrated over it from 0 to 1; another one
- * next to never. Places are as likely beforehand as there are others of as many traits. */
+/* Log of prior times marginal likelihood. A claim of the place differs with an unknown probability, uniform on [0,
+ * 1] and integrated out; any other with probability `astray`. Prior: about one over the number of places of as many
+ * traits. */
 static double log_likelihood(const struct traits *t, uint64_t bits, int num_traits)
 {
     double differ = 0, all = 0, outside = 0;
@@ -45,7 +46,7 @@ static double log_likelihood(const struct traits *t, uint64_t bits, int num_trai
            num_traits * log(t->num);
 }
 
-/* The likeliest, in order. */
+/* Inserts p into the list of the likeliest places, sorted. */
 static void keep(struct place best[MOST_KEPT], struct place p)
 {
     for (int i = 0; i < MOST_KEPT; i++)
@@ -78,7 +79,7 @@ static void name_place(const struct traits *t, uint64_t bits, FILE *to)
         }
 }
 
-/* Those that differ inside a place, and of all that agree those that are inside. */
+/* Counts the claims of a place that differ and that agree. */
 static void count(const struct traits *t, uint64_t bits, int *differ, int *agree)
 {
     *differ = *agree = 0;
@@ -162,7 +163,7 @@ static void tell(const struct traits *t, FILE *to)
          i++) {
         int differ, agree;
         count(t, best[i].bits, &differ, &agree);
-        /* A part of what has been told already, unless that makes the difference. */
+        /* Skip a part of the best place, unless it excludes all claims that agree. */
         if ((best[i].bits & best[0].bits) == best[0].bits && agree > 0)
             continue;
         fputs(told++ == 1 ? " Nearly as likely: " : "; or ", to);

@@ -1,5 +1,5 @@
-/* What the claims that differ have in common and the others have not: a hint where no known bug explains
- * the differences. */
+/* What the claims that differ have in common and the others lack: a hint if no known bug explains the
+ * differences. */
 #ifndef ASSAY_SHARED_FEATURES_H
 #define ASSAY_SHARED_FEATURES_H
 
@@ -7,10 +7,10 @@
 
 #include <jansson.h>
 
-/* Writes what the claims share that are DIFFERENT and should be EQUIVALENT: the likeliest trait
- * (claim_traits.h) or pair of traits, how many claims that came out EQUIVALENT have it too, what is nearly
- * as likely, and the scenes; or that they share nothing. How: tools/docs/background/diagnosis.md. The text
- * is empty if no claim differs; else the suite of results (results.json) is opened. */
+/* Writes to text what the claims share that are DIFFERENT but should be EQUIVALENT: the likeliest trait
+ * (claim_traits.h) or pair of traits, how many EQUIVALENT claims have it too, what is nearly as likely, and
+ * the scenes; or that they share nothing. Method: tools/docs/background/diagnosis.md. The text is cut at
+ * size; it is empty if no claim differs, and then the suite in suite_dir is not opened. */
 NODISCARD bool shared_features_tell(const json_t *results, const char *suite_dir, char *text,
                                     size_t size, struct err *e);
 

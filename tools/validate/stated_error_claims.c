@@ -1,5 +1,5 @@
 /* Claims about stated errors ("consistency"): does the error that renders state agree with the
- * error between them. */
+ * error between them? */
 #include "validate_internal.h"
 
 #include "reference/replicates/engine_driver.h"
@@ -16,7 +16,7 @@
 #include <stdlib.h>
 #include <unistd.h>
 
-/* Pixels in which the same samples come to something else. */
+/* Numbers of pixels in which the same samples, added up in another way, give another result. */
 struct parts {
     int merged, resumed, adaptive;
     char reason[128]; /* of the first of them */
@@ -33,7 +33,7 @@ struct share {
     bool keep; /* image and state stay, for a resumed render */
 };
 
-/* One render of the scene; image, log and state are removed. */
+/* Renders the scene once; unless share->keep, image, log and state are removed. */
 static bool render_one(const struct validate_options *opt, const struct suite_scene *s,
                        const struct share *share, double deadline, struct moments *out,
                        double *seconds, struct err *e)
@@ -61,7 +61,7 @@ static bool render_one(const struct validate_options *opt, const struct suite_sc
     return true;
 }
 
-/* The first render's samples again: in two shares that are merged, and with a pause between. */
+/* Renders the samples of the first render again: interrupted and resumed, and as two shares that are merged. */
 static bool judge_parts(const struct validate_options *opt, const struct suite_scene *s,
                         const struct moments *whole, double deadline, struct parts *out,
                         double *seconds, struct err *e)
@@ -93,7 +93,7 @@ static bool judge_parts(const struct validate_options *opt, const struct suite_s
     return ok;
 }
 
-/* What the four questions came to; the later ones are asked of some scenes. */
+/* Answers to the four questions; the last three are asked of some scenes only. */
 struct findings {
     struct stated_error c;
     struct sample_efficiency noise;
@@ -114,7 +114,7 @@ static bool judge_noise(const struct suite_scene *s, const struct moments *rende
     return ok;
 }
 
-/* The number of samples, up to 64 batches, that most pixels have. */
+/* The most frequent number of samples per pixel, among whole batches up to 64. */
 static int frequent_count(const struct moments *m, int batch)
 {
     enum { BATCHES = 64 };
@@ -156,7 +156,7 @@ static bool judge_stop(const struct validate_options *opt, const struct suite_sc
     return ok;
 }
 
-/* The first of them that differs, else the first that is undecided. */
+/* Verdict and reason of the row: those of a finding that differs, else of one that is undecided. */
 static enum verdict overall(const struct suite_scene *s, const struct findings *f, char reason[256])
 {
     if (f->stop.too_early + f->stop.too_late > 0 && f->c.verdict != VERDICT_DIFFERENT) {

@@ -15,10 +15,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* What starting a program and judging its image costs, in vertices of paths. */
+/* The cost of starting a program and judging its image, in path vertices. */
 static const double start_cost = 3e5;
 
-/* About what the next look of a claim costs, in vertices of paths. */
+/* Approximate cost of a claim's next look, in path vertices; 0: nothing has to be rendered. */
 static double cost(const struct claim_run *t)
 {
     const struct suite_scene *s = t->scene;
@@ -35,10 +35,10 @@ static double cost(const struct claim_run *t)
     return samples > 0 ? samples * (s->depth + 1) + starts * start_cost : 0;
 }
 
-/* Where time matters: round by round, so that every claim gets its first look before any gets its fifth,
- * and in a round the cheapest first. A claim with a single look, which costs about as much as the third
- * look of others, comes before that round, or after the first if nothing is rendered for it. --until-different
- * goes by cost alone; a scene that must differ cannot be what it waits for, and comes last. */
+/* Order of the looks. With a budget they go round by round, so that every claim gets its first look before any gets
+ * its second, and within a round the cheapest comes first. A claim with a single look, which costs about as much as
+ * the third look of others, comes before that round, or before the second if nothing is rendered for it.
+ * --until-different goes by cost alone; a scene that must differ cannot end it, and comes last. */
 static double round_of(const struct validation *v, const struct claim_run *t)
 {
     if (v->opt->until_different)
@@ -75,7 +75,7 @@ static void tell_round(struct validation *v, const struct claim_run *t)
     validate_log(v, t->scene->name, note);
 }
 
-/* Claims that --until-different did not look at are not in the results. */
+/* Collects the results of all claims; those that --until-different did not look at have none. */
 static void collect(const struct validation *v, json_t *root)
 {
     json_t *consistency = json_array(), *noise = json_array();
@@ -92,7 +92,7 @@ static void collect(const struct validation *v, json_t *root)
     json_object_set_new(root, "seconds", json_real(progress_seconds() - v->start));
 }
 
-/* Shows it if due. */
+/* Shows the results so far, if due. */
 static bool show_so_far(struct validation *v, const json_t *root, struct err *e)
 {
     if (!(v->opt->show_every_s > 0) || progress_seconds() < v->shown + v->opt->show_every_s)
@@ -119,7 +119,8 @@ static const struct suite_scene *root_of(const struct validation *v, const struc
     return suite_find(&v->suite, t->scene->references_of);
 }
 
-/* Scene by scene, with those that have the same references, until each has been begun by some thread. */
+/* Takes looks scene by scene (together with scenes that share its references), until each has been begun by some
+ * thread. */
 static void take_scenes(void *ctx, size_t first, size_t last)
 {
     struct validation *v = ctx;
@@ -142,8 +143,8 @@ static void take_scenes(void *ctx, size_t first, size_t last)
     } while (root != NULL);
 }
 
-/* Scenes side by side where the order is free and only our program runs, with parts of the threads: it starts, and files are
- * written, by one thread. */
+/* Takes scenes side by side, each with a part of the threads, if the order is free and only our program runs: it
+ * starts up and files are written single-threaded, which leaves processors idle. */
 static void take_side_by_side(struct validation *v)
 {
     enum { MOST = 8 };
@@ -159,8 +160,8 @@ static void take_side_by_side(struct validation *v)
     v->opt = all;
 }
 
-/* Until all is decided, or the time is over, or, for --until-different, one differs: what was not looked
- * at by then stays without a result. */
+/* Takes looks until all is decided, the time is over, or, with --until-different, a claim differs; claims not
+ * looked at by then stay without a result. */
 static bool take_looks(struct validation *v, const json_t *root, struct err *e)
 {
     bool found = false, ok = true;
@@ -181,7 +182,7 @@ static bool take_looks(struct validation *v, const json_t *root, struct err *e)
     return ok;
 }
 
-static const double small_alpha = 1e-5; /* of a run: below, no tail is known well enough */
+static const double small_alpha = 1e-5; /* of a run; no tail is known well enough below it */
 
 static const struct alpha_spending *sequence_of(const struct validate_options *o)
 {
@@ -227,7 +228,7 @@ static void validation_free(struct validation *v)
     suite_free(&v->suite);
 }
 
-/* The loader is not believed either: each selected scene, once. */
+/* Compares our loader with Blender's on each selected scene. */
 static bool check_loader(const struct validation *v, json_t *root, struct err *e)
 {
     const struct import_options io = {.work_dir = v->opt->out_dir,
@@ -276,7 +277,7 @@ static void tell_where(const struct validation *v)
             o->engine != NULL ? ", engine " : "", o->engine != NULL ? o->engine->file : "");
 }
 
-/* What is known before the first look. */
+/* Adds to the results what is known before the first look. */
 static void describe(const struct validation *v, json_t *cannot, json_t *root)
 {
     const struct engine *en = v->opt->engine;

@@ -84,7 +84,7 @@ static const struct cli_option options[] = {
     {'h', "help", "", "print this", TO(help), .usage = "usage: assay validate [options]\n"},
     {0}};
 
-/* A suite of one's own says what it judges, and stores what that is held against. */
+/* A suite of one's own names the engine that it judges; its references are stored. */
 static bool ask_own_suite(struct validate_command *c, struct err *e)
 {
     struct suite suite;
@@ -102,7 +102,7 @@ static bool ask_own_suite(struct validate_command *c, struct err *e)
            err_set(e, "%s/suite.json names no 'engine': give --engine FILE", c->opt.suite_dir);
 }
 
-/* A name alone is one of those that came with us. */
+/* A name without a path is that of a description in SHARE/engines. */
 static bool load_engine(struct validate_command *c, struct err *e)
 {
     const char *file = c->engine_file;
@@ -129,7 +129,7 @@ static void print_not_expressible(const json_t *results)
                member_text(entry, "scene"), member_text(entry, "reason"));
 }
 
-/* index.html from results that are there only as long as that takes, so that nothing takes them for a run's. */
+/* Writes index.html from a temporary results file, removed at once so that it is not mistaken for that of a run. */
 static bool write_page_so_far(const json_t *so_far, const struct validate_options *o, struct err *e)
 {
     const struct path json = fs_path("%s/so_far.json", o->out_dir);
@@ -172,7 +172,7 @@ static bool write_all(const json_t *results, const char *out_dir, bool quiet, st
     return true;
 }
 
-/* The one line on stderr that exit code 3 owes, also where the table on stdout has gone elsewhere. */
+/* The line on stderr that goes with exit code 3: the table on stdout may have gone elsewhere. */
 static void tell_not_judged(const json_t *results, struct err *e)
 {
     struct results_walk first = {.kind = NUM_JUDGED};
@@ -195,7 +195,7 @@ static void tell_not_judged(const json_t *results, struct err *e)
                 member_text(first.json, "error"));
 }
 
-/* Not judged counts most, then a difference, then an inconclusive claim. */
+/* Combines both exit codes: not judged takes precedence, then a difference, then an inconclusive claim. */
 static int with_loader(int code, const json_t *results, struct err *e)
 {
     int loader = import_result_exit_code(json_object_get(results, "loader"));

@@ -12,19 +12,19 @@
 #include <pthread.h>
 
 enum { MAX_PATH = 8192, NUM_STAGES = 2, CLAIM_NAME = 256 };
-/* Of a scene: each reference with ours, the closed form and the further engine; that with ours; variants; consistency;
- * noise. */
+/* Of a scene: each reference against ours, the closed form and the further engine; that engine against ours; variants;
+ * stated errors; noise. */
 enum { MAX_CLAIMS = 3 * MAX_REFERENCES + MAX_VARIANTS + 3 };
 
 enum side_kind {
     SIDE_OURS,   /* the program under test, or a variant of it */
     SIDE_TRUTH,  /* a closed form: exact, for every look */
-    SIDE_GOLDEN, /* stored: the same for every look, and its noise in every stage */
+    SIDE_GOLDEN, /* stored: the same image, and so the same noise, at every look and stage */
     SIDE_LIVE,   /* an engine's replicates, rendered now */
     SIDE_ENGINE  /* the further engine */
 };
 
-/* An image as it was at one look. */
+/* The image of a side at one look. */
 struct side_image {
     bool present, written;
     struct moments m;
@@ -33,8 +33,8 @@ struct side_image {
     struct pathtracer_rays rays; /* of ours; 0: not known */
 };
 
-/* One side of a claim, in two streams of samples of different seeds. Image l of a stream holds that of
- * each smaller look. */
+/* One side of a claim, in two streams of samples (stages) with different seeds. The image at a look contains
+ * the samples of all earlier looks of its stream. */
 struct side {
     enum side_kind kind;
     const char *name;
@@ -43,7 +43,7 @@ struct side {
     const struct suite_reference *ref;   /* SIDE_TRUTH to SIDE_LIVE */
     int users;                           /* claims that may want another look */
     struct side_image at[NUM_STAGES][NUM_LOOKS];
-    double wall_s, units; /* of what was rendered in this run: time and observations */
+    double wall_s, units; /* rendered in this run: wall seconds and observations */
     double cpu_s;
     bool failed;
     struct err e;
@@ -51,13 +51,13 @@ struct side {
 
 struct scene_sides {
     struct side ours, variant[MAX_VARIANTS], reference[MAX_REFERENCES], engine;
-    /* What the engine is held against: the sides above, or, where it has a pixel filter of its own, those of the scene
-     * with that filter; of a reference that cannot be had with it, scene is NULL. */
+    /* What an engine with a pixel filter of its own is compared with: the sides above of the scene with that
+     * filter; scene is NULL in a reference that is not available with it. */
     struct suite_scene filtered;
     struct side peer_ours, peer[MAX_REFERENCES];
 };
 
-/* One claim on its way. */
+/* A claim being judged. */
 struct claim_run {
     const struct suite_scene *scene;
     struct side *a, *b; /* NULL: the claim of consistency, or of noise */
@@ -66,11 +66,11 @@ struct claim_run {
     enum verdict expected;
     const struct alpha_spending *looks;
     int stages;   /* 1 or 2 */
-    int next;     /* look; NUM_LOOKS: none is left */
-    bool stalled; /* what is left of the budget is too short for it */
+    int next;     /* the next look; NUM_LOOKS: none is left */
+    bool stalled; /* the rest of the budget is too short for its next look */
     bool begun;   /* by one of the threads that take scenes */
     bool told;    /* the result is published: all threads may read it */
-    /* What the last look saw: the images of a and b, NULL before the first. */
+    /* Of the last look: the images of a and b (NULL before the first), and what follows. */
     struct side_image *seen[2];
     int look, stage;
     struct comparison c;
@@ -84,14 +84,14 @@ struct validation {
     struct suite suite;
     struct scene_sides *sides; /* per scene */
     struct claim_run *task;
-    pthread_mutex_t lock; /* of done, begun, told and the lines of progress */
+    pthread_mutex_t lock; /* guards done, begun, told and the lines of progress */
     int num_tasks, done;
     json_t *
-        left_out; /* {reference: in how many scenes it cannot be had with the engine's filter}; NULL: that is the box of one pixel */
+        left_out; /* {reference: scenes in which it lacks the engine's filter}; NULL: that is the box of one pixel */
     const struct alpha_spending *sequence;
     int stages;
     double start, deadline; /* of progress_seconds(); deadline INFINITY: none */
-    double shown;           /* when the last look so far was shown, or the start */
+    double shown;           /* when show() was last called, or the start */
     double alpha;           /* of one claim */
 };
 
@@ -102,56 +102,58 @@ double validate_time_left(const struct validation *v);
 
 enum fetch_result { FETCH_OK, FETCH_FAILED /* the side's e says why */, FETCH_NO_TIME };
 
-/* Can it have more samples, and can it be had again with fresh seeds? Adaptive variants cannot grow,
- * as their samples depend on each other, nor can the further engine. */
+/* Can the side take more samples? Has it an image at every look? Can it be rendered again with fresh seeds? Adaptive
+ * variants, whose samples depend on each other, and the further engine cannot grow. */
 bool side_grows(const struct side *s);
 bool side_is_at_any_look(const struct side *s);
 bool side_can_be_fresh(const struct side *s);
-/* Observations at a look, 0 if it has none there. Sides that never change always have 1. */
+/* Samples or replicates at a look; 0: it has no image there. Goldens and closed forms: always 1. */
 int side_count(const struct side *s, int look);
-/* About what the missing part of a look costs, in path samples; 0 where it is there. */
+/* Approximate cost of the missing part of a look's image, in paths; 0 if it is present. */
 double side_cost(const struct side *s, int look);
-/* The image of a stream at a look, rendered as far as it is missing. */
+/* The image of a stage at a look; renders what is missing of it. *out stays the side's. */
 enum fetch_result side_at(struct validation *v, struct side *s, int stage, int look,
                           struct side_image **out);
-/* Writes it for the report, once; *file is relative to out_dir. */
+/* Writes that image for the report, unless it has been; *file: its path, relative to out_dir. */
 NODISCARD bool side_write(const struct validation *v, struct side *s, int stage, int look,
                           struct path *file, struct err *e);
 void side_free(struct side *s);
 
-/* Does --only want any, does it want all of a scene's claims? */
+/* Does --only select any claim of a scene? All of them? */
 bool scene_is_selected(const struct validate_options *o, const char *name);
 bool scene_is_selected_whole(const struct validate_options *o, const char *name);
 /* SCENE/CLAIM, as --only takes it: see validate.h. */
 void claim_run_name(const struct claim_run *t, char name[CLAIM_NAME]);
-/* Sides and tasks of all selected scenes and claims; scenes that the further engine cannot express are appended to
- * `cannot`. Fails on an unknown name, and where the engine can express none, unless this run is part of a larger one. */
+/* Sets up sides and tasks of the selected scenes and claims; appends scenes that the further engine cannot express
+ * to `cannot`. Fails on an unknown name, and if the engine can express no scene, unless this run is part of a
+ * larger one. */
 NODISCARD bool select_claims(struct validation *v, json_t *cannot, struct err *e);
-/* Moves t->next on to the first look, itself included, at which anything is new, or to NUM_LOOKS. */
+/* Advances t->next, if need be, to a look with new observations, or to NUM_LOOKS. */
 void claim_next_look(struct claim_run *t);
-/* Takes one look, of which t->result is set if it decides or was the last. */
+/* Takes one look; sets t->result if that decides or was the last. */
 void claim_run_look(struct validation *v, struct claim_run *t);
-/* Ends it, INCONCLUSIVE; why: what comes before the last look's reason. Without a look the time is over. */
+/* Ends an undecided claim; why is put before the reason of its last look. A claim without a look gets the error
+ * that the budget is spent. */
 void claim_run_give_up(struct validation *v, struct claim_run *t, const char *why);
-/* DIFFERENT where EQUIVALENT should be. */
+/* Has the claim come out DIFFERENT against expectation? */
 bool claim_run_differs(const struct claim_run *t);
 void claim_run_free(struct claim_run *t);
 
-/* A row of pathtracer's that is not judged: for that error, or, `late`, because its renders were not done in time. */
+/* A row of pathtracer that was not judged, a new reference: with that error, or, if late, because time ran out. */
 json_t *validate_bare_row(const char *scene, const char *error, bool late);
 
-/* Renders the scene as its consistency asks, below out_dir, and judges. A new reference; NULL only out
- * of memory. deadline: of progress_seconds(), or INFINITY; what is not done by then is INCONCLUSIVE, with
- * an "error" that says so. */
+/* Renders what the scene's "consistency" asks for, below out_dir, and judges it: a row, a new reference; NULL
+ * only if out of memory. deadline: of progress_seconds(), or INFINITY; if it is not done by then, the row is
+ * INCONCLUSIVE with an "error" that says so. */
 json_t *stated_error_run(const struct validate_options *opt, const struct suite_scene *s,
                          double alpha, double deadline);
 
-/* Paths that the claim about a scene's noise costs; every scene has one where goldens hold the noise of any
- * (noise_ladder_is_kept()). */
+/* Number of paths that the claim about a scene's noise takes. Every scene has such a claim if the noise of any is
+ * stored (noise_ladder_is_kept()). */
 double noise_claims_samples(const struct suite_scene *s);
-/* Renders the ladders of ours below out_dir and judges them; rows of "noise" (noise_results.h), those of other engines as
- * they are stored behind ours. truth: the scene's closed form, where it is there already; NULL. A new reference; NULL only out
- * of memory. deadline as above. */
+/* Renders our ladders below out_dir and judges them. Returns the rows of "noise" (noise_results.h), a new
+ * reference: ours, then those of other engines as stored. truth: the scene's closed form, if already rendered, or
+ * NULL. deadline as above. */
 json_t *noise_claims_run(const struct validate_options *opt, const struct suite_scene *s,
                          const struct moments *truth, double alpha, double deadline);
 

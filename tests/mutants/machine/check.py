@@ -82,7 +82,7 @@ def check_mutator(folder):
     say("mutator: two samples share nothing and are all", not {m.id for m in one} & {m.id for m in two} and len(one) + len(two) == len(everything)
         and len({m.id for m in everything}) == len(everything))
     def stratified(order):
-        """Is there, for every beginning, one share of which each file has its own, to one mutant?"""
+        """Does every beginning hold the same share of each file's mutants, to within one mutant?"""
         size = collections.Counter(m.file for m in order)
         for n in (100, 400, 3000):
             count = collections.Counter(m.file for m in order[:n])

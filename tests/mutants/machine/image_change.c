@@ -1,5 +1,5 @@
 /* image_change A.exr B.exr [A.exr B.exr ...]: how two renders of the same seed differ, a line for each pair:
- *     same                     the bits of n, mean, M2 and M3
+ *     same                     n, mean, M2 and M3 have the same bits
  *     MEAN T VAR T CHANGED     else: the largest relative change of the mean and of the variance of a sample of any tile of 16 x 16
  *                              pixels, in any channel, with its size in standard errors, and 1 if one of the two is a change:
  *                              of a mean by more than 1 %, of a variance by more than 10 %, and by more than 5 standard errors
@@ -37,7 +37,7 @@ static double stated(const struct moments *m, size_t p, int c)
     return m->n[p] > 0 ? variance(m, p, c) / m->n[p] : 0;
 }
 
-/* Of one tile and channel: the mean, or else the variance. */
+/* Change of a tile in one channel: of the mean, or else of the variance of a sample. */
 static struct change tile_change(const struct moments *a, const struct moments *b, int x0, int y0,
                                  int c, bool of_mean)
 {

@@ -5,10 +5,10 @@
     tests/mutants/machine/mutate.py --list [FILE...] one line each: id, file, line, operator, before, after
     tests/mutants/machine/mutate.py --show ID        the changed line
 
-A mutant's id is a hash of its file, its line's text, the how-manieth such line that is, the token within it, the operator and the
-replacement: it survives changes elsewhere in the file. Sources are taken as clang-format leaves them: a binary operator has a
-space on both sides, and a unary one or a pointer's star has none behind it. Only the bodies of functions and the initial values
-of tables are changed, never declarations, which other files have been compiled with.
+A mutant's id is a hash of its file, its line's text, the line's number among equal lines, the token within it, the
+operator and the replacement: it survives changes elsewhere in the file. Sources have to be formatted by clang-format:
+a binary operator has a space on both sides, a unary one or a pointer's star has none behind it. Only the bodies of
+functions and the initial values of tables are changed, never declarations, which other files are compiled with.
 """
 import glob
 import hashlib
@@ -69,7 +69,7 @@ def scan(source):
 
 
 def partners(tokens):
-    """Index of the bracket that belongs to each."""
+    """For each bracket's index that of its partner."""
     pair, stack = {}, []
     for i, t in enumerate(tokens):
         if t.kind == "sign" and t.text in OPENING:
@@ -268,8 +268,8 @@ def apply(m, source):
 
 
 def sample(mutants, number):
-    """Sample 1 or 2 of all mutants: a hash puts each into one or the other. In an order of which each beginning has every file's
-    share, to one mutant, and within a file a random one."""
+    """Sample 1 or 2 of all mutants: a hash puts each into one or the other. Ordered so that every beginning holds the
+    same share of each file, to within one mutant; the order within a file is random."""
     def hashed(what, m):
         return hashlib.sha256((what + m.id).encode()).hexdigest()
 

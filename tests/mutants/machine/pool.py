@@ -1,4 +1,4 @@
-"""The scenes that say whether a mutant changes an image: of the assignment (ASSAY_CS184), and made from them, apart from the suite."""
+"""Renders that decide whether a mutant changes an image: the assignment's scenes (ASSAY_CS184) and variants of them."""
 import os
 import re
 

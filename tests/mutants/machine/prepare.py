@@ -1,5 +1,5 @@
-"""What run.py has to know before: the images and verdicts of the renderer as it is, how long each unit test takes, and which lines each
-test and each render runs (gcov)."""
+"""What run.py has to know beforehand: images and verdicts of the unchanged renderer, the time of each unit test, and
+which lines each test and each render runs (gcov)."""
 import json
 import os
 import subprocess
@@ -12,7 +12,7 @@ TEST_CPU = 10  # seconds; unit tests that take longer are left out
 
 class Preparation(Workshop):
     def prepare(self):
-        """Baselines, times, and which line is run by which test and which render."""
+        """Measures baselines, times, and the lines that each test and render runs; goes on after an interruption."""
         base = os.path.join(self.dir, "validate")
         if not os.path.exists(base + "/results.json") or not os.path.exists(self.base):
             os.makedirs(self.base, exist_ok=True)

@@ -64,7 +64,7 @@ class Runner(Workshop):
         return [l.split() for l in out.stdout.splitlines()]
 
     def judge_pool(self, program, m):
-        """1: changes an image, 0: does not, -: there is no pool. Cheap ones first; the first change decides."""
+        """1: changes an image, 0: does not, -: there is no pool. The first change, in the order of pool.py, decides."""
         runs = [(n, a) for n, a in self.pool_runs() if n in self.runs and self.executes(n, m) and n != "make sky"]
         if not self.pool_runs():
             return "-"
@@ -80,8 +80,8 @@ class Runner(Workshop):
         return "0"
 
     def judge_validate(self, program, m):
-        """Who found it: (verdict, scene and claim). Without: "not run" (no render of the suite runs the line), "same" (no image of 8
-        samples changes), "passed", "inconclusive", "out of time"."""
+        """(verdict, scene and claim) that found it, or ("-", why not): "not run" (no render of the suite runs it),
+        "same" (no image of 8 samples changes), "passed", "inconclusive", "out of time"."""
         tasks, started = {}, cpu_now()
         covering = [r for r in self.suite_runs() if r[0] in self.runs and self.executes(r[0], m)]
         if not covering:
@@ -167,7 +167,7 @@ class Runner(Workshop):
         return self.judge_sanitized(m, [n for n in self.depends[m.file] if n in objects and not self.is_narrow(n)], order, late, fresh)
 
     def judge_sanitized(self, m, names, tests, late, fresh):
-        """What no test finds is built once more as `make check` builds it, for the quick ones among the tests that it runs under sanitizers."""
+        """If no test finds it, the quick ones that `make check` runs under sanitizers are asked again, built so."""
         tests = [t for t in tests if t in self.sanitized and t not in late and self.info["tests"][t] < QUICK
                  and os.path.exists(os.path.join(self.build, "san", self.tests()[t] + ".o"))]
         objects = {}
@@ -260,7 +260,7 @@ class Runner(Workshop):
             return "stillborn", "", "", "", ""
         return "mutant", unit, verdict, by, image
 
-    # Many.
+    # A sample.
 
     def go(self, number, seconds, again=False):
         path = os.path.join(self.dir, "sample%d.tsv" % number)

@@ -28,7 +28,7 @@ def limited(cpu_s, memory=4 << 30):
 
 
 def run(argv, cpu_s=600, cwd=None, **more):
-    """Exit status; negative or 124 if it died or took longer than it may."""
+    """Exit status; negative if a signal ended it (the CPU limit, for example), 124 past the wall-clock limit."""
     try:
         return subprocess.run(argv, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=cwd,
                               preexec_fn=limited(cpu_s), timeout=20 * cpu_s + 20, **more).returncode
@@ -53,7 +53,7 @@ def make_says(build, target):
 
 class Workshop:
     def __init__(self, build, name="machine", tests=None, scenes=None, shard=(0, 1)):
-        """Results below BUILD/name. With tests and scenes: those alone, all of them for every mutant."""
+        """Results go below BUILD/name. tests, scenes: use only these, and all of them for every mutant."""
         self.build = os.path.abspath(build)
         self.dir = os.path.join(self.build, name)
         self.some_tests, self.scenes = tests, scenes
@@ -111,7 +111,7 @@ class Workshop:
         return run(self.cc + STRICT + flags + list(extra) + ["-c", "-o", out, source], 120, cwd=self.tree) == 0
 
     def base_object(self, name):
-        """Of the sources as they are, compiled in the same way as mutants; to be asked for while the tree is not changed."""
+        """An object of the unchanged sources, compiled like mutants; to be called while the tree is unchanged."""
         path = os.path.join(self.base, name + ".o")
         if not os.path.exists(path):
             os.makedirs(os.path.dirname(path), exist_ok=True)
@@ -120,7 +120,7 @@ class Workshop:
         return path
 
     def mutated(self, names, fresh):
-        """Compiles; None if one does not compile, else the objects that are not the same."""
+        """Compiles all names; None if one does not compile, else {name: object} of those that differ from base."""
         changed = {}
         for name in names:
             out = os.path.join(fresh, name.replace("/", "_") + ".o")

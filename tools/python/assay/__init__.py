@@ -9,12 +9,12 @@
 
 A side is
   a path                  whatever the command `assay compare` takes: moments EXR, image, directory of replicates
-  an array (H, W[, C])    one image, C = 3 (R, G, B) or 1; noise is then told by neighbours. Floats are radiance;
-                          uint8 and uint16 are codes and need curve="srgb" or another
+  an array (H, W[, C])    one image, C = 3 (R, G, B) or 1; noise is estimated from neighbouring pixels. Floats are
+                          radiance; uint8 and uint16 are codes and need curve="srgb" or another
   an array (K, H, W, C)   K >= 3 replicates, each with a seed of its own
-  assay.Moments           running sums over samples or replicates: the sharpest
+  assay.Moments           running sums over samples or replicates: the most sensitive
 
-Rows come from the top. Margins and what they mean: guide-report.md and background/verdict.md of the project.
+Rows run from the top. What margins mean: guide-report.md and background/verdict.md of the project.
 """
 
 from ._compare import NotJudged, Region, Result, compare

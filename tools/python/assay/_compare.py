@@ -1,4 +1,4 @@
-"""Two sides to a verdict."""
+"""From two sides to a verdict: compare()."""
 
 import ctypes as c
 import os
@@ -15,7 +15,7 @@ _CHANNELS = ("red", "green", "blue", "luminance")
 
 
 class NotJudged(Exception):
-    """The renders could not be compared: bad input, other sizes, options that do not go together. Never a pass."""
+    """The renders could not be compared: bad input, different sizes, options that exclude each other. Never a pass."""
 
 
 @dataclass(frozen=True)
@@ -54,10 +54,10 @@ class Result:
     verdict: "EQUIVALENT", "DIFFERENT", "INCONCLUSIVE" or "NO DIFFERENCE FOUND"; reason: one sentence
     passes: EQUIVALENT, or NO DIFFERENCE FOUND and no more than accept_mdb could have been missed
     image, worst, worst_tile: Region; difference, ci: of the image's luminance, relative
-    mdb, mdb_tile: the smallest relative error, of the image and of any tile, that would have been found with 95 %
-    extra_factor: not decided: about how many times the samples would decide (100: that or more)
+    mdb, mdb_tile: the smallest relative error, of the image and of any tile, found with a probability of 95 %
+    extra_factor: if undecided, about how many times the samples would decide (100: that or more)
     variance_ratio, variance_ci: A's variance over B's, or None
-    exact_p: of exchangeable or same_program, else None
+    exact_p: p-value of exchangeable or same_program, else None
     z, relative: arrays (H, W): luminance of each pixel, difference over its standard error, relative difference
     notes: what had to be assumed
     """
@@ -155,14 +155,15 @@ def compare(a, b, *, margin=None, margin_tile=None, margin_variance=None, accept
     """Judges a (tested) against b (reference); sides as in the package. Returns a Result, raises NotJudged.
 
     margin: largest relative difference of the image's mean that counts as equal; margin_tile: of a tile's (4 x margin);
-      without one nothing is EQUIVALENT: any difference is looked for
+      without margins any difference is looked for, and nothing is EQUIVALENT
     margin_variance: the same for the variance of one sample or replicate; without it variances are not judged
-    accept_mdb, accept_mdb_tile: without a margin: passes if nothing is found and such an error could not be missed
+    accept_mdb, accept_mdb_tile: without margins: passes if nothing is found and no such error could have been missed
     alpha: chance of a wrong DIFFERENT, and of a wrong EQUIVALENT; tile: side of a reporting tile, pixels
     again=(a2, b2): fresh renders of both: DIFFERENT only if they confirm what a and b show
     paired: both share their noise (one seed, two versions)
     exchangeable: exact test by permutation of replicates
-    same_program: exact test of "nothing changed" between two versions with equally many samples; filter_width: of that
+    same_program: exact test of "nothing changed" between two versions with equally many samples; filter_width: pixels
+      nearer than this may share noise (0: it is measured)
     curve: of integer images: "srgb", "linear", "gamma=2.2", "cgl"; spp_a, spp_b: of files with a variance only
     """
     options = Options()

@@ -47,7 +47,7 @@ class Result(c.Structure):
 
 
 def _places():
-    """ASSAY_LIBRARY; beside this package, where pip puts it; the build of a checkout; what the system knows."""
+    """Where to look: ASSAY_LIBRARY alone; else beside this package (by pip), a checkout's build, the system's."""
     here = Path(__file__).resolve().parent
     name = f"libassay.so.{ABI}"
     if "ASSAY_LIBRARY" in os.environ:

@@ -8,13 +8,13 @@ from ._library import lib, new_error
 
 
 class Moments:
-    """Per pixel and channel: n observations, their mean, and sums of squared and cubed differences from it.
+    """Per pixel and channel: n observations, their mean, and sums of squared and cubed deviations from it.
 
-    Add samples or whole images as they are rendered, or make one of sums that your renderer keeps: Moments.of().
+    Add samples or whole images as they are rendered, or start from sums that your renderer keeps: Moments.of().
     """
 
     def __init__(self, width, height, unit="sample", spp=0):
-        """Without observations. Sizes in pixels.
+        """Moments of no observations yet. Sizes in pixels.
 
         unit: what one observation is, "sample" or "replicate"; spp: paths in it, if known.
         """
@@ -69,7 +69,7 @@ class Moments:
             raise ValueError(f"no sample {rgb} at {x},{y} of {self.shape[1]} x {self.shape[0]} pixels")
 
     def merge(self, other):
-        """+= other, as if all had been added to one."""
+        """Adds the observations of other, as if all had been added to this one."""
         self._need_handle()
         other._need_handle()
         error = new_error()

@@ -1,4 +1,4 @@
-"""Assertions for pytest and its like: they fail with the verdict, the worst region and the path of a page."""
+"""Assertions for pytest and other runners: a failure shows the verdict, the worst region and the path of a page."""
 
 import os
 import re
@@ -36,7 +36,7 @@ def _check(result, report):
 
 
 def assert_equivalent(render, reference, *, margin, report=None, **options):
-    """Fails unless both are shown to be equal within the margin: DIFFERENT and INCONCLUSIVE both fail.
+    """Fails unless the two are shown to be equal within the margin: DIFFERENT and INCONCLUSIVE both fail.
 
     The margin is yours to declare: the largest relative difference of the image's mean that does not matter (tiles:
     4 times that). Other options as of compare(). report: where the page of a failure goes. Returns the Result.
@@ -46,8 +46,8 @@ def assert_equivalent(render, reference, *, margin, report=None, **options):
 
 
 def assert_unchanged(render, previous, *, accept_mdb, report=None, **options):
-    """For two versions of one program with equally many samples and seeds of their own: fails if the law of any pixel
-    has changed, or if a change of accept_mdb (relative; tiles: 4 times that) of the image could have been missed.
+    """For two versions of one program with equally many samples and different seeds: fails if the distribution of any
+    pixel has changed, or if a change of the image by accept_mdb (relative; tiles: 4 times that) could have been missed.
     """
     __tracebackhide__ = True
     return _check(compare(render, previous, same_program=True, accept_mdb=accept_mdb, **options), report)
