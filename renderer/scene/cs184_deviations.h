@@ -6,7 +6,7 @@
 #include "scene.h"
 
 enum cs184_deviation {
-    CS184_LIGHT_PDF, /* the density of a light sample lacks a factor 1/distance: irradiance falls as 1/r */
+    CS184_LIGHT_PDF, /* the density of a light sample lacks a factor of the distance: irradiance falls as 1/r */
     CS184_TURNED_LAMP, /* the rectangle that is sampled is turned by 90 degrees against the one that is seen */
     CS184_BECKMANN, /* the shadowing of rough metals has a pi for a sqrt(pi) (microfacet.h) */
     NUM_CS184_DEVIATIONS

@@ -785,7 +785,7 @@ if "$assay" grade -q -o "$tmp/probe" "$tmp/quick.rubric" "$tmp/subs/right" >"$tm
     expect "grade: the plot of it" 0 "all points while a bar touches green" cat "$tmp/named/student/index.html"
     expect "grade: and whether another run would change it" 0 "gets the same points here" cat "$tmp/named/student/index.html"
     expect "grade: a right program is not diagnosed" 0 '"diagnosis": null' cat "$tmp/named/right/grade.json"
-    expect "grade: staff see who has it" 0 'student/index.html.*density lacks 1/distance' bash -c "tr -d '\n' <'$tmp/named/index.html'"
+    expect "grade: staff see who has it" 0 'student/index.html.*density lacks a factor of the distance' bash -c "tr -d '\n' <'$tmp/named/index.html'"
     if ! grep -q "<html" "$tmp/named/student/index.html" ||
         grep -q "Behind the curtain\|http://\|https://\|<script" "$tmp/named/student/index.html"; then
         not_ok "grade: the page has no hidden check and needs no other file" "it does"

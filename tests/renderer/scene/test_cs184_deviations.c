@@ -42,7 +42,7 @@ static double sampled_irradiance(const struct scene *s, vec3 p, vec3 *most)
 }
 
 /* The same by the rectangle's area, in double: cos cos / d^2 at 400 x 400 places. `times_distance`: what a density
- * without its factor of 1/distance makes of it. */
+ * that lacks a factor of the distance makes of it. */
 static double irradiance(float width, float depth, float height, vec3 p, bool times_distance)
 {
     enum { SIDE = 400 };
