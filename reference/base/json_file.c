@@ -48,7 +48,8 @@ json_t *json_read_object(const char *path, struct err *e)
 bool json_write_as(const char *path, const json_t *root, size_t flags, struct err *e)
 {
     struct out_file out;
-    /* All that jansson needs before there is a file: without memory for it the program may end (tools/commands/assay.c). */
+    /* Serialise before the file is opened: if jansson runs out of memory, the program may end
+     * (tools/commands/assay.c). */
     char *text = json_dumps(root, flags);
     if (text == NULL)
         return err_set(e, "%s: cannot write JSON", path);
@@ -61,7 +62,7 @@ bool json_write_as(const char *path, const json_t *root, size_t flags, struct er
 
 bool json_write(const char *path, const json_t *root, struct err *e)
 {
-    /* 12 digits: more than any estimate here holds, and a file that a person can read. */
+    /* 12 digits: more than the precision of any estimate here, and still readable. */
     return fs_make_parent_dirs(path, e) &&
            json_write_as(path, root, JSON_INDENT(1) | JSON_REAL_PRECISION(12), e);
 }

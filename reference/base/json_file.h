@@ -1,4 +1,4 @@
-/* JSON files that appear whole. */
+/* JSON files: reading with file and line in every error, atomic writing. */
 #ifndef ASSAY_JSON_FILE_H
 #define ASSAY_JSON_FILE_H
 
@@ -6,18 +6,19 @@
 
 #include <jansson.h>
 
-/* json_load_file() of a regular file; a FIFO, say, fails to open. A new reference; NULL, and why in *why. */
+/* As json_load_file(), but a FIFO or device fails to open. Returns a new reference, or NULL with the reason in *why. */
 json_t *json_read(const char *path, size_t flags, json_error_t *why);
 
-/* The same, members may not repeat; NULL with the line "FILE:LINE: why", or "FILE: why" where it cannot be opened. */
+/* The same, but rejects duplicate members; the error is "FILE:LINE: why", or "FILE: why" if the file cannot be
+ * opened. */
 json_t *json_read_or_say(const char *path, struct err *e);
 
-/* A new reference; {} without a file; NULL: error. */
+/* Reads a JSON object: a new reference, an empty object if there is no such file, NULL on error. */
 json_t *json_read_object(const char *path, struct err *e);
 
-/* Writes by rename, indented, with a final newline; makes the directories above it. */
+/* Writes the file atomically (by rename), indented, with a final newline; creates its parent directories. */
 NODISCARD bool json_write(const char *path, const json_t *root, struct err *e);
-/* The same with flags of json_dumps(), in a directory that is there. */
+/* The same with the given json_dumps() flags; the directory must exist. */
 NODISCARD bool json_write_as(const char *path, const json_t *root, size_t flags, struct err *e);
 
 #endif

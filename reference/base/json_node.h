@@ -33,7 +33,7 @@ NODISCARD bool json_get_number(const struct json_node *n, const char *key, doubl
 NODISCARD bool json_get_text(const struct json_node *n, const char *key, char *out, size_t size,
                              struct err *e);
 
-/* The same of a member that may be missing: *out is left as it is then. */
+/* The same for optional members: if one is missing, *out keeps its value. */
 NODISCARD bool json_may_int(const struct json_node *n, const char *key, int lo, int hi, int *out,
                             struct err *e);
 NODISCARD bool json_may_number(const struct json_node *n, const char *key, double lo, double hi,
@@ -42,18 +42,18 @@ NODISCARD bool json_may_text(const struct json_node *n, const char *key, char *o
                              struct err *e);
 bool json_has(const struct json_node *n, const char *key);
 
-/* A number, and an interval as [lo, hi], or null where one of them is not finite. */
+/* A number; an interval as [lo, hi]; null if a value is not finite. New references. */
 json_t *json_finite(double v);
 json_t *json_interval(double lo, double hi);
 
-/* An array of texts as a command line, after `first` (NULL: nothing), in words that
- * shell_quote_split() reads back: to free(). NULL out of memory. */
+/* `first` (unless NULL) and an array of strings as one command line, quoted so that
+ * shell_quote_split() reads the same words back. The caller frees it; NULL if out of memory. */
 NODISCARD char *json_command_line(const char *first, const json_t *words);
 
-/* Two numbers, the lower first? */
+/* Is v an array of two numbers, the lower first? */
 bool json_is_interval(const json_t *v);
 
-/* One element of an array after the other, as a json_t * of that name. */
+/* Loops over an array; in the body, `element` is a json_t * to the current element. */
 #define json_each(element, array)                                                                  \
     for (size_t element##_at = 0, element##_on = 1;                                                \
          element##_on && element##_at < json_array_size(array);                                    \
@@ -61,13 +61,13 @@ bool json_is_interval(const json_t *v);
         for (json_t * (element) = json_array_get(array, element##_at); element##_on;               \
              element##_on = !element##_on)
 
-/* A member of an object of which all is known: NULL, "" and 0 where it is absent. */
+/* Members of an object that was validated before; NULL, "" and 0, respectively, if absent. */
 const char *member_text(const json_t *object, const char *name);
 const char *member_or_empty(const json_t *object, const char *name);
 double member_number(const json_t *object, const char *name);
-/* The first object of an array whose "name" is this; NULL: none. */
+/* The first object of an array whose "name" equals `name`; NULL if there is none. */
 const json_t *member_named(const json_t *array, const char *name);
-/* Of an interval: its lower (0) or upper (1) end. */
+/* The lower (end = 0) or upper (end = 1) end of a member that is an interval. */
 double member_end(const json_t *object, const char *name, size_t end);
 
 #endif

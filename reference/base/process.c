@@ -22,9 +22,9 @@ enum {
     POLL_MS = 100,       /* longest sleep between two looks at the child */
     GRACE_S = 2,         /* from SIGTERM to SIGKILL */
     LAST_LINES = 6,      /* quoted in the error line */
-    LAST_CHARS = 640,    /* of it at most */
+    LAST_CHARS = 640,    /* of that at most */
     LOG_MAX = 64 << 20,  /* bytes; a flood must not fill the disk */
-    TAIL_SIZE = 16 << 10 /* of output kept in memory */
+    TAIL_SIZE = 16 << 10 /* bytes of output kept in memory */
 };
 
 /* The last bytes a program printed. */
@@ -60,10 +60,10 @@ bool process_find(const char *argv0, char *path, size_t size)
     return false;
 }
 
-/* The guard leads the process group and outlives nothing: when the process that runs us dies, of
- * whatever, even SIGKILL, the kernel sends the guard SIGUSR1 and it takes the group with it. It
- * also keeps the group's number from being reused until we have killed the group. Only
- * async-signal-safe calls, since the parent may have threads. */
+/* The guard is a process that leads the process group. If its parent dies for any reason, even by
+ * SIGKILL, the kernel sends the guard SIGUSR1, and the guard kills the group. It also keeps the
+ * group's id from being reused until we have killed the group. Only async-signal-safe calls, since
+ * the parent may have threads. */
 static _Noreturn void guard_main(pid_t parent)
 {
     sigset_t all, wake;
@@ -82,7 +82,7 @@ static _Noreturn void guard_main(pid_t parent)
     _exit(1);
 }
 
-/* What a child is to become; `status` receives errno if that fails. */
+/* The arguments of child_main(); if exec fails, errno is written to the pipe `status`. */
 struct child {
     const struct process *p;
     const char *path;
@@ -90,7 +90,7 @@ struct child {
     int out, status;
 };
 
-/* Until exec. It may be in our memory, where AddressSanitizer would remember frames that do not return. */
+/* The child until exec. It may share our memory, in which AddressSanitizer would track frames that never return. */
 __attribute__((no_sanitize("address"))) static int child_main(void *arg)
 {
     const struct child *c = arg;
@@ -101,7 +101,7 @@ __attribute__((no_sanitize("address"))) static int child_main(void *arg)
     sigset_t none;
     sigemptyset(&none);
     sigprocmask(SIG_SETMASK, &none, NULL);
-    /* Above 2 first: the parent may have been started with closed standard files. */
+    /* Move the descriptors above 2 first: the parent may have been started with stdin, stdout or stderr closed. */
     const int status = fcntl(c->status, F_DUPFD_CLOEXEC, 3),
               out = fcntl(c->out, F_DUPFD_CLOEXEC, 3);
     int null = fcntl(open("/dev/null", O_RDONLY | O_CLOEXEC), F_DUPFD_CLOEXEC, 3);
@@ -114,15 +114,16 @@ __attribute__((no_sanitize("address"))) static int child_main(void *arg)
     _exit(127);
 }
 
-/* ThreadSanitizer would take what a child does in our memory for our own. */
+/* ThreadSanitizer would attribute a child's accesses to shared memory to us. */
 #ifdef __SANITIZE_THREAD__
 #define IN_OUR_MEMORY 0
 #else
 #define IN_OUR_MEMORY (CLONE_VM | CLONE_VFORK)
 #endif
 
-/* fork() that does not let a signal handler of ours run in the child, which has a copy of our memory; or, with `c`, our memory
- * itself until it is that program: a copy takes longer the more we have. What is called before might change more than memory. */
+/* fork() with signals blocked, so that no signal handler of ours runs in the child. With `c`, a clone() that shares our
+ * memory until exec, as copying takes longer the more memory we have; not with c->p->before, which might change that
+ * memory. */
 static pid_t fork_blocked(struct child *c)
 {
     _Alignas(64) char stack[1 << 16];
@@ -165,8 +166,8 @@ static void tail_add(struct tail *t, const char *data, size_t n)
     t->size = keep + n;
 }
 
-/* The last non-empty lines joined by " | ", at most LAST_CHARS of them, in printable ASCII: the
- * line goes to terminals, JSON and XML. */
+/* The last non-empty lines joined by " | ", at most LAST_CHARS characters of printable ASCII:
+ * the line goes to terminals, JSON and XML. */
 static void tail_quote(const struct tail *t, char out[LAST_CHARS + 8])
 {
     size_t begin = t->size;
@@ -233,7 +234,7 @@ static void log_write(struct run *r, const char *data, size_t n)
         write_all(r, full, sizeof full - 1);
 }
 
-/* But for ends of lines and tabs; a carriage return ends a line, too. Bytes of UTF-8 stay. */
+/* Replaces control characters except newline and tab by '?'; a carriage return becomes a newline. UTF-8 bytes stay. */
 static void hide_controls(char *text, size_t n)
 {
     for (size_t i = 0; i < n; i++) {
@@ -244,8 +245,7 @@ static void hide_controls(char *text, size_t n)
     }
 }
 
-/* Takes what the pipe holds, at most about 1 MiB at a time so that a flood cannot hide the clock.
- */
+/* Reads what the pipe holds, at most about 1 MiB per call, so that a flood of output cannot delay the time limit. */
 static void drain(struct run *r)
 {
     char buffer[1 << 16];
@@ -264,7 +264,7 @@ static void drain(struct run *r)
     }
 }
 
-/* Guard first, so that there is no moment without one. */
+/* Starts the guard before the child, so that the child never runs unguarded. */
 static bool start(const struct process *p, const char *path, struct run *r, struct err *e)
 {
     int out[2] = {-1, -1}, status[2] = {-1, -1};
@@ -310,7 +310,7 @@ fail:
     return false;
 }
 
-/* Runs the clock until the child has ended; true if it had to be stopped. */
+/* Waits until the child has ended, enforcing the time limit; true if that was reached. */
 static bool watch(const struct process *p, struct run *r, double t0, int *status,
                   struct rusage *usage)
 {

@@ -1,4 +1,4 @@
-/* Runs other people's programs: own process group, time limit, last lines of output kept. */
+/* Runs external programs in a process group of their own, with a time limit, keeping their last lines of output. */
 #ifndef ASSAY_PROCESS_H
 #define ASSAY_PROCESS_H
 
@@ -11,9 +11,9 @@ struct process {
     const char *cwd;         /* NULL: the current one */
     const char *log;         /* file that receives stdout and stderr, at most 64 MiB; NULL: none */
     size_t
-        log_most; /* its limit in bytes instead; control characters then become '?'; 0: 64 MiB, unchanged */
-    /* Called in the new process before it becomes the program, with calls that may follow fork() alone; false, with
-     * errno: it is not started. May be NULL. */
+        log_most; /* limit of the log, bytes; control characters then become '?'. 0: 64 MiB, output unchanged */
+    /* Called in the child before exec; may make only async-signal-safe calls. If it returns false, with errno set, the
+     * program is not started. May be NULL. */
     bool (*before)(const void *ctx);
     const void *before_ctx;
     double timeout_s; /* wall time; 0: none */
@@ -25,14 +25,14 @@ struct process {
 struct process_usage {
     double wall_s, cpu_s; /* of the child and of those of its descendants that were waited for */
     int exit_status;      /* -1: it did not end by itself */
-    int signal;           /* that ended it, before its time was up; 0: none */
+    int signal;           /* the signal that ended it before its time limit; 0: none */
 };
 
 /* Runs to the end. True if it exited with status 0. Otherwise the line says: not found / killed by
  * signal N / exit status N / no end after N s, then the last lines it printed, joined by " | "
- * (ASCII only). At the time limit the whole process group gets SIGTERM, 2 s later SIGKILL. When
- * this returns, and when the calling process dies of anything, every process of the group has been
- * killed. stdin is /dev/null. usage may be NULL; it is filled whenever the program was started. May
+ * (ASCII only). At the time limit the whole process group gets SIGTERM, 2 s later SIGKILL. Every
+ * process of the group is killed by the time this returns, and also if the calling process dies for
+ * any reason. stdin is /dev/null. usage may be NULL; it is filled whenever the program was started. May
  * be called from several threads. Linux only (PR_SET_PDEATHSIG). */
 NODISCARD bool process_run(const struct process *p, struct process_usage *usage, struct err *e);
 

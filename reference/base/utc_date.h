@@ -1,4 +1,4 @@
-/* The time of day as files have it. */
+/* Timestamps as written into files. */
 #ifndef ASSAY_UTC_DATE_H
 #define ASSAY_UTC_DATE_H
 

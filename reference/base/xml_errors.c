@@ -15,7 +15,7 @@ static void note(void *failed, xml_complaint complaint)
     *(bool *)failed = true;
 }
 
-/* Its lists say it here. */
+/* Errors of libxml2's list functions arrive here. */
 static void note_text(void *failed, const char *text, ...)
 {
     (void)text;

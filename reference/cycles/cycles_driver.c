@@ -1,4 +1,5 @@
-/* Drives Blender: the dump, one Blender process for all replicates that are asked for, and the fold. */
+/* The Cycles driver: writes the scene dump, runs one Blender process for all replicates requested, folds their
+ * images. */
 #include "blender.h"
 #include "export_cycles.h"
 #include "reference/replicates/engine_driver.h"
@@ -15,7 +16,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Of replicates first .. last-1. */
+/* The seeds of replicates first .. last-1. */
 static json_t *seeds_of(const struct reference_job *job, int first, int last)
 {
     json_t *seeds = json_array();
@@ -34,7 +35,7 @@ static bool write_seeds(const struct reference_job *job, int first, int last, st
     return ok;
 }
 
-/* What cycles.py says at the very end: "ASSAY OK {...}". */
+/* Parses the line that cycles.py prints at the very end: "ASSAY OK {...}". The caller releases *report. */
 static bool read_report(const char *log, json_t **report, struct err *e)
 {
     static const char mark[] = "ASSAY OK ";
@@ -57,7 +58,7 @@ static bool read_report(const char *log, json_t **report, struct err *e)
     return err_set(e, "blender: ended without the OK line of cycles.py");
 }
 
-/* All replicates into *out. */
+/* Folds all replicates into *out. */
 static bool fold_replicates(const struct reference_job *job, const struct replicate_images *images,
                             struct moments *out, json_t *manifest, struct err *e)
 {

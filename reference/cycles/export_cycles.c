@@ -26,7 +26,7 @@ static json_t *camera_json(const struct scene *s, const struct camera *c, struct
         return NULL;
     }
     double near, far;
-    /* Blender keeps a rotation, not a matrix. */
+    /* Blender stores a rotation, not a matrix, so the axes must be orthonormal. */
     if (!features_check_axes("Cycles", c, e) ||
         !features_clip_depths("Cycles", s, c, &near, &far, e))
         return NULL;
@@ -39,9 +39,9 @@ static json_t *camera_json(const struct scene *s, const struct camera *c, struct
     }
     double nearest, furthest;
     features_distances(s, c, &nearest, &furthest);
-    nearest -= (double)c->lens_radius; /* where a ray may start */
+    nearest -= (double)c->lens_radius; /* rays start anywhere on the lens */
     furthest += (double)c->lens_radius;
-    /* Cycles clips by depth, we by distance: take planes that clip nothing in either, or the same. */
+    /* Cycles clips by depth, we by distance: use planes that clip nothing in both, or the same primitives. */
     double corner = sqrt(1 + tan_h * tan_h + square * square);
     if (near == 0)
         near = 0.5 * nearest / corner;
@@ -53,8 +53,8 @@ static json_t *camera_json(const struct scene *s, const struct camera *c, struct
                      (double)c->lens_radius, "focal_distance", (double)c->focal_distance);
 }
 
-/* Cycles cuts its Gauss off at 6 sigmas, beyond which less than a float's rounding is left. Blender's width is four sigmas, ten
- * pixels at most. */
+/* Cycles truncates its Gauss at 6 sigma, beyond which less than a float's rounding is left. Blender's filter width is 4
+ * sigma, at most 10 pixels. */
 static bool check_filter(const struct pixel_filter *f, struct err *e)
 {
     char text[PIXEL_FILTER_TEXT];

@@ -9,21 +9,21 @@
 
 json_t *cycles_vec3(vec3 v);
 json_t *cycles_rgb(rgb c);
-/* Names are only labels here; other bytes than ASCII's become '?'. */
+/* Names are only labels here; bytes outside printable ASCII become '?'. */
 json_t *cycles_name(const char *name);
 
-/* Parts of the dump; NULL with a line in *e if the recipe cannot express them. */
+/* Parts of the dump (new references); NULL with a line in *e if Cycles cannot express them. */
 json_t *cycles_materials(const struct scene *s, const char *dump, struct err *e);
 json_t *cycles_meshes(const struct scene *s, struct err *e);
 json_t *cycles_spheres(const struct scene *s, vec3 eye);
 json_t *cycles_lights(const struct scene *s);
-/* Textures, each an EXR of its linear texels beside the dump; *written: how many, also where it fails. */
+/* Writes each texture as an EXR of linear texels beside the dump; *written: how many, also on failure. */
 bool cycles_write_textures(const struct scene *s, const char *dump, uint32_t *written,
                            struct err *e);
 void cycles_remove_textures(const char *dump, uint32_t written);
-/* What the dump says of a map; its image has been written. */
+/* The dump's entry for a map (1 + index of the texture) whose image has been written. */
 json_t *cycles_map(const struct scene *s, uint32_t map, const char *dump, struct err *e);
-/* An image goes to image_path, by rename; *image_written tells if so. */
+/* An image environment is written to image_path, by rename; *image_written tells whether one was. */
 json_t *cycles_environment(const struct scene *s, const char *image_path, bool *image_written,
                            struct err *e);
 

@@ -7,12 +7,12 @@
 
 #include <math.h>
 
-/* Normals closer than this to the geometric one are the geometric one: text with six digits. */
+/* Shading normals this close to the geometric one count as equal to it: files have six digits. */
 #define FLAT 1e-5
 
-/* The Glossy BSDF of 3.4 is GGX with separable Smith shadowing and one colour at all angles, of
- * roughness 1 at most; it takes small ones for a mirror, and its formula loses digits before. Every
- * other microfacet is made of random facets (cycles_material.py). */
+/* The Glossy BSDF of Blender 3.4 is GGX with separable Smith shadowing, one colour at all angles
+ * and roughness up to 1; it treats small roughness as a mirror and loses precision already above
+ * that. Every other microfacet is made of random facets (cycles_material.py). */
 static bool needs_facets(const struct material *m)
 {
     const bool shines = m->kind == MATERIAL_PLASTIC && !rgb_is_zero(m->specular);
@@ -108,7 +108,7 @@ static void push(json_t *array, const float *v, int num, float sign)
 }
 
 /* A triangle's shading normals: +1 all on the geometric normal's side, -1 all on the other (the
- * renderer turns them), 0 mixed. *flat: they are the geometric normal, of either sign. */
+ * renderer turns them), 0 mixed. *flat: all equal the geometric normal or all its opposite. */
 static int normals_side(const vec3 *p, const vec3 *n, bool *flat)
 {
     dvec3 ng = features_normal(p);
@@ -123,7 +123,7 @@ static int normals_side(const vec3 *p, const vec3 *n, bool *flat)
     return positive == 3 ? 1 : positive == 0 ? -1 : 0;
 }
 
-/* The flat or the smooth triangles of one object; appended if there are any. */
+/* Appends the flat or the smooth triangles of one object as a mesh, if there are any. */
 static bool push_mesh(json_t *out, const struct scene *s, const struct object *o, bool smooth,
                       struct err *e)
 {
@@ -174,8 +174,8 @@ json_t *cycles_spheres(const struct scene *s, vec3 eye)
     for (uint32_t i = 0; i < s->num_spheres; i++) {
         const struct sphere *sp = &s->spheres[i];
         const struct material *m = &s->materials[s->sphere_material[i]];
-        /* Analytic spheres are invisible from inside and no lights; an opaque sphere is seen from
-         * inside only by an eye that is there. */
+        /* Analytic spheres are invisible from inside and cannot be lights; an opaque sphere is seen
+         * from inside only if the eye is inside. */
         bool opaque = m->kind != MATERIAL_REFRACTION && m->kind != MATERIAL_GLASS;
         bool inside = d3_length(d3_sub(d3_of(eye), d3_of(sp->centre))) < sp->radius;
         bool dark = rgb_is_zero(m->radiance);

@@ -12,7 +12,8 @@ static struct path image_file(const char *dump, uint32_t texture)
     return fs_path("%s.texture%u.exr", dump, texture);
 }
 
-/* A border is a black texel around the image, beyond which it is clamped. */
+/* Texels of padding: TEXTURE_BORDER is expressed as one black texel around the image and
+ * clamping. */
 static int pad_of(const struct texture *t, int axis)
 {
     return t->wrap[axis] == TEXTURE_BORDER;

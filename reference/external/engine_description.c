@@ -17,7 +17,7 @@ static const char *const output_names[] = {"mean", "exact", "moments", "noisy", 
 static const char *const channel_names[] = {"together", "separate", NULL};
 static const char *const image_names[] = {"exr", "hdr", "pfm", NULL};
 
-/* What a placeholder may be called in each of the arrays. */
+/* The placeholders that each of the arrays may contain. */
 static const char *const in_command[] = {"scene",  "out",     "spp",  "seed", "depth", "width",
                                          "height", "threads", "here", "name", NULL};
 static const char *const in_version[] = {"here", NULL};
@@ -45,8 +45,8 @@ static bool get_word(const struct json_node *n, const char *key, const char *con
     return *out >= 0 || err_set(e, "%s: '%s' is '%s', none of: %s", n->file, key, text, list);
 }
 
-/* The piece of `text` that a brace begins: its length, or 0 where the braces do not match. "{{" and
- * "}}" have two bytes. */
+/* Length of the piece of `text` that starts with this brace: 2 for "{{" and "}}", 0 if braces do not
+ * match. */
 static size_t brace_length(const char *text)
 {
     if (text[1] == text[0])
@@ -55,7 +55,7 @@ static size_t brace_length(const char *text)
     return text[0] == '{' && text[1 + n] == '}' ? n + 2 : 0;
 }
 
-/* One argument: printable, and only known placeholders. `used` collects them as bits. */
+/* Checks that one argument is a single line with known placeholders only; `used` collects these as bits. */
 static bool check_argument(const struct json_node *n, const char *key, size_t index,
                            const char *text, const char *const *names, unsigned *used,
                            struct err *e)
@@ -146,7 +146,7 @@ static bool read_features(const struct json_node *n, struct engine *en, struct e
     return true;
 }
 
-/* Lens and environment are in every exported file; for a .dae they are on the command line. */
+/* Exported files contain lens and environment; with "dae" they are passed on the command line. */
 static bool read_extra(const struct json_node *n, const struct engine *en, const char *key,
                        const char *const *names, enum feature feature, struct err *e)
 {
@@ -178,7 +178,7 @@ static bool read_margin(const struct json_node *n, struct engine *en, struct err
            json_get_text(&m, "reason", en->margin_reason, sizeof en->margin_reason, e);
 }
 
-/* Only what we write can be written in grey, and the channels of moments cannot be put together from three files. */
+/* Only scenes that we export can be made grey, and moments cannot be assembled from one file per channel. */
 static bool read_channels(const struct json_node *n, struct engine *en, struct err *e)
 {
     int word = 0;
@@ -194,8 +194,9 @@ static bool read_channels(const struct json_node *n, struct engine *en, struct e
                    n->file);
 }
 
-/* What splats, as most do, shares samples; what draws its samples by the filter does not, and says so. Of moments, whose file
- * says how noisy a pixel is, nobody knows how it was filled. */
+/* Renderers that splat, as most do, share samples between pixels; those that importance-sample the filter do not, and
+ * say so. A moments file states each pixel's noise but not what its pixels share, so with moments nothing may be
+ * shared. */
 static bool read_filter(const struct json_node *n, struct engine *en, struct err *e)
 {
     char text[PIXEL_FILTER_TEXT];
@@ -292,7 +293,8 @@ void engine_free(struct engine *en)
     *en = (struct engine){0};
 }
 
-/* Appends the argument with its placeholders replaced; what does not fit is only counted. */
+/* Writes the argument with its placeholders replaced, as far as it fits in `room`; returns the bytes needed, NUL
+ * included. */
 static size_t fill_in(const char *text, const struct engine_value *values, char *out, size_t room,
                       const char **missing)
 {

@@ -1,4 +1,4 @@
-/* What engine_run.c, engine_scene.c and engine_manifest.c share; of no interest elsewhere. */
+/* Shared by engine_run.c, engine_scene.c and engine_manifest.c only. */
 #ifndef ASSAY_ENGINE_INTERNAL_H
 #define ASSAY_ENGINE_INTERNAL_H
 
@@ -13,15 +13,16 @@ struct engine_job {
     const struct engine_options *opt;
     const char *dir; /* absolute */
     char scene[3][PATH_SIZE],
-        program[4096]; /* scene: of each channel; of channels together the first */
-    int channel;       /* which of them is rendered */
+        program[4096]; /* scene: one per channel; with channels together, only the first */
+    int channel;       /* the channel being rendered */
     int spp, replicates;
     bool half; /* some image had fewer than 32 bits */
     double cpu_s;
     json_t *independence; /* with opt->check_independence: what the manifest gets; else NULL */
 };
 
-/* Checks the features and writes the scene to paths[0], or a grey one for each channel; of a .dae only fills paths[0]. */
+/* Checks the features and writes the scene to paths[0], or a grey scene for each channel. For "dae" and "file" it only
+ * sets paths[0] to the scene's own file ("file": without checks). */
 NODISCARD bool engine_write_scene(const struct engine *en, const struct suite_scene *suite,
                                   const char *dir, char paths[3][PATH_SIZE], struct err *e);
 

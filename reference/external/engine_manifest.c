@@ -48,7 +48,8 @@ bool engine_program(const struct engine *en, const char *key, char *path, size_t
     return ok;
 }
 
-/* The first line with something in it, printable ASCII. */
+/* The first line that is not blank of the "version" command's output, as printable ASCII; "unknown"
+ * without that command. */
 static bool read_version(const struct engine_job *j, char line[256], struct err *e)
 {
     char program[4096];
@@ -84,7 +85,8 @@ static bool read_version(const struct engine_job *j, char line[256], struct err 
     return ok && (found || err_set(e, "%s: no version in what it prints", program));
 }
 
-/* Hashes of the files of {here} that the command names: a script is not its interpreter. */
+/* Hashes of the files of {here} that the command names: for a script, the program's hash is only
+ * that of its interpreter. */
 static bool hash_files(const struct engine *en, json_t *files, struct err *e)
 {
     const json_t *command = json_object_get(en->json, "command");

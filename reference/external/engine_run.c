@@ -21,7 +21,7 @@
 
 enum { NUMBER = 32 };
 
-/* The command of one process, to free(). */
+/* The arguments of one process; the caller frees *argv. */
 static bool command_line(struct engine_job *j, uint32_t seed, const char *out, char ***argv,
                          struct err *e)
 {
@@ -75,7 +75,7 @@ static bool run_process(struct engine_job *j, uint32_t seed, const char *out, st
     return ok;
 }
 
-/* Image k: one run, or one for each channel with a seed of its own, of which that channel counts. */
+/* Image k (the caller frees it): one run, or one per channel, each with its own seed and used for that channel only. */
 static float *render_image(struct engine_job *j, int k, struct err *e)
 {
     const struct path path = fs_path("%s/replicate_%04d.%s", j->dir, k, j->en->image);
@@ -104,7 +104,7 @@ static float *render_image(struct engine_job *j, int k, struct err *e)
     return out;
 }
 
-/* n: 1 of an exact image; of a noisy one 3, as noise_estimate.h has it, which is no count of anything. */
+/* n: 1 for an exact image; 3 for a noisy one, by the convention of noise_estimate.h, where n is not a count. */
 static void make_single(struct moments *m, const char *unit, double n)
 {
     strcpy(m->unit, unit);
@@ -153,7 +153,7 @@ static bool fold_runs(struct engine_job *j, struct moments *m, struct err *e)
     return ok;
 }
 
-/* Factors of means, of variances and of third cumulants. */
+/* Multiplies means, variances and third cumulants by these factors. */
 static void multiply(struct moments *m, double first, double second, double third)
 {
     for (size_t i = 0; i < 3 * (size_t)m->width * (size_t)m->height; i++) {
@@ -183,7 +183,8 @@ static bool run_all(struct engine_job *j, struct moments *out, struct err *e)
         strcpy(m.unit, "replicate");
         m.spp = j->spp;
         ok = ok && fold_runs(j, &m, e);
-        /* A sum over pixels that share samples varies more than the sum of their variances: they count as noisier. */
+        /* The variance of a sum over pixels that share samples exceeds the sum of their variances, which is inflated to
+         * match. */
         if (ok && j->en->shares_samples && strcmp(m.unit, "replicate") == 0)
             multiply(&m, 1, pixel_filter_sharing(&j->en->filter, 2),
                      pixel_filter_sharing(&j->en->filter, 3));

@@ -1,4 +1,4 @@
-/* Whether an engine can express a scene, and the scene in its format. */
+/* Checks whether an engine can express a scene, and writes the scene in its format. */
 #define _GNU_SOURCE
 #include "engine_internal.h"
 
@@ -61,7 +61,7 @@ static bool grey_environment(struct scene *s, int channel, struct err *e)
     return true;
 }
 
-/* All colours become what they are in one channel. */
+/* Replaces every colour by the grey of its value in one channel. */
 static bool make_grey(struct scene *s, int channel, struct err *e)
 {
     for (uint32_t i = 0; i < s->num_materials; i++) {
@@ -82,7 +82,7 @@ static bool write_channel(const struct engine *en, const struct suite_scene *sui
 {
     struct scene s = {0};
     struct camera c;
-    assert(en->format != NULL); /* read_channels() sees to it */
+    assert(en->format != NULL); /* ensured by read_channels() */
     if (!suite_open(suite, &s, &c, e))
         return false;
     c.filter = en->filter;
@@ -107,8 +107,8 @@ bool engine_write_scene(const struct engine *en, const struct suite_scene *suite
     if (!suite_open(suite, &s, &c, e))
         return false;
     c.filter = en->filter;
-    /* Mitsuba's count of bounces is ours plus one whoever reads the file, and so on: that is the
-     * exporter's business. depth_offset is only for {depth}. */
+    /* Exporters handle formats that count bounces differently (Mitsuba's depth is ours plus one);
+     * depth_offset only affects {depth}. */
     bool ok = check_features(en, features_of_scene(&s, &c), e);
     if (ok && en->format == NULL)
         ok =

@@ -79,8 +79,8 @@ static bool same_light(const struct import_pair *pair, const struct light *l, co
            (!aimed || import_geometry_angle(direction, aim) <= AXIS_TOLERANCE);
 }
 
-/* Two triangles that emit to one side and have their centre at a light of Blender's: a rectangle of light.
- * The triangles share its diagonal, their longest edge, whose middle is the centre. */
+/* Is o a rectangular light, that is two triangles that emit on one side, centred at this place? The triangles
+ * share the diagonal, their longest edge, whose midpoint is the centre. */
 static bool is_rectangle_at(const struct import_pair *pair, const struct object *o, dvec3 place)
 {
     const struct scene *s = pair->s;
@@ -102,8 +102,8 @@ static bool is_rectangle_at(const struct import_pair *pair, const struct object 
     return d3_length(d3_sub(centre, place)) <= IMPORT_PLACE_TOLERANCE * pair->extent;
 }
 
-/* Each light of Blender's has to be one of ours, and each of ours one of Blender's. `found` grows by the
- * triangles of rectangles. */
+/* Every light of Blender's must match one of ours, and vice versa. Marks the triangles of rectangular lights
+ * in `found`. */
 static bool compare_lights(struct import_pair *pair, const json_t *lights, json_int_t num_ambient,
                            bool *found, struct err *e)
 {

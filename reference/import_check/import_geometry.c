@@ -20,8 +20,8 @@ void import_geometry_differ(struct import_pair *pair, const char *fmt, ...)
     pair->out->agrees = false;
 }
 
-/* Everything of one comparison. Corners of our triangles are welded to vertices: those nearer than the
- * tolerance are one. */
+/* The state of one comparison. Corners of our triangles that are closer than the tolerance are welded into
+ * one vertex. */
 struct check {
     struct import_pair *pair;
     double tolerance;
@@ -34,7 +34,7 @@ struct check {
     bool *found;                    /* per triangle of ours; the caller's */
 };
 
-/* Blender turns each file to Z up, we turn it to Y up (renderer/docs/dialect.md); from its axes to ours:
+/* Blender converts each file to Z up, we to Y up (renderer/docs/dialect.md). A point of the file in both:
  * file (x,y,z)    Blender     ours
  *   Y_UP         (x,-z,y)   (x,y,z)
  *   Z_UP         (x,y,z)    (-x,z,y)
@@ -153,7 +153,7 @@ static dvec3 vector_area(const struct check *c, uint32_t triangle)
     return (dvec3){n.x / 2, n.y / 2, n.z / 2};
 }
 
-/* Triangle of ours, not found before, inside the polygon and to the same side. */
+/* Is t an unmatched triangle of ours whose corners are among the polygon's and that faces the same way? */
 static bool belongs(const struct check *c, const struct polygon *p, uint32_t t, dvec3 area)
 {
     return !c->found[t] && d3_dot(vector_area(c, t), area) > 0 &&
@@ -162,7 +162,7 @@ static bool belongs(const struct check *c, const struct polygon *p, uint32_t t, 
            corner_of(p, c->corner_vertex[3 * t + 2]) < p->n;
 }
 
-/* Takes our triangles that make up the polygon. For three corners that is one. */
+/* Matches a polygon with the triangles of ours that make it up (one, if it has three corners). */
 static void match_polygon(struct check *c, const struct polygon *p)
 {
     dvec3 area = {0}, covered = {0};
@@ -227,7 +227,7 @@ bool import_geometry_read_point(const json_t *array, size_t at, dvec3 *out)
     return true;
 }
 
-/* In our axes. */
+/* The same, converted to our axes. */
 static bool read_turned(const struct check *c, const json_t *array, size_t at, dvec3 *out)
 {
     if (!import_geometry_read_point(array, at, out))

@@ -7,11 +7,11 @@
 
 #define IMPORT_PLACE_TOLERANCE  1e-5 /* of the scene's extent */
 #define IMPORT_NORMAL_TOLERANCE 1e-4 /* rad, of normals of faces */
-/* Of a file's own normals: Blender keeps two angles of 16 bits each and makes 0 of what is below
- * acos(1 - 1e-4). */
+/* rad, of normals stored in the file: Blender stores two angles of 16 bits each and sets those
+ * below acos(1 - 1e-4) to 0. */
 #define IMPORT_CUSTOM_TOLERANCE 0.0145
 
-/* One file as both have read it. */
+/* One file as read by both programs. */
 struct import_pair {
     const struct scene *s;
     struct import_report *out;
@@ -21,13 +21,14 @@ struct import_pair {
 
 /* From Blender's axes to ours. */
 dvec3 import_geometry_point(const struct import_pair *pair, dvec3 b);
-/* Three numbers from `at` on; false if they are none. */
+/* Reads three numbers from index `at` on; false if they are not numbers. */
 bool import_geometry_read_point(const json_t *array, size_t at, dvec3 *out);
-/* The first difference of a file is the one that is reported. */
+/* Records a difference; only the first one of a file is kept. */
 void import_geometry_differ(struct import_pair *pair, const char *fmt, ...)
     __attribute__((format(printf, 2, 3)));
 
-/* found: one per triangle of ours, set for those that some polygon is made of. */
+/* found: a flag per triangle of ours, set if it is part of a polygon of Blender's. Fails on a
+ * malformed dump. */
 NODISCARD bool import_geometry_compare(struct import_pair *pair, const json_t *meshes, bool *found,
                                        struct err *e);
 

@@ -28,7 +28,7 @@ static void filename(struct writer *w, const char *ending)
     mitsuba_text(w->xml, "string", "filename", fs_path("%s_%s", w->base, ending).s);
 }
 
-/* As check_filter() has let through. */
+/* Only for filters that check_filter() accepts. */
 static void put_filter(struct writer *w, const struct pixel_filter *f)
 {
     static const char *const names[] = {"box", "tent", "gaussian"};
@@ -47,7 +47,8 @@ static void put_camera(struct writer *w)
     mitsuba_begin(w->xml, "sensor", c->lens_radius > 0 ? "thinlens" : "perspective", NULL, NULL);
     mitsuba_real(w->xml, "float", "fov", 2 * atan((double)c->tan_h) * 180 / M_PI);
     mitsuba_text(w->xml, "string", "fov_axis", "x");
-    /* Depths, not distances along the ray; nothing is cut (features_check_exportable()). */
+    /* Mitsuba's are depths, ours distances along the ray; nothing is cut
+     * (features_check_exportable()). */
     double corner = sqrt(1 + (double)c->tan_h * c->tan_h + (double)c->tan_v * c->tan_v);
     mitsuba_real(w->xml, "float", "near_clip", (double)c->near / corner);
     mitsuba_real(w->xml, "float", "far_clip", (double)c->far);
@@ -70,7 +71,8 @@ static void put_camera(struct writer *w)
     mitsuba_end(w->xml);
 }
 
-/* An index of refraction: rgb values outside a lamp may not be above 1, an image's may. */
+/* An index of refraction; a coloured one goes into an image, as Mitsuba limits other rgb values to
+ * 1. */
 static bool put_index(struct writer *w, const char *name, uint32_t material, rgb value,
                       struct err *e)
 {
@@ -90,7 +92,7 @@ static bool put_index(struct writer *w, const char *name, uint32_t material, rgb
     return ok;
 }
 
-/* Rough, or a mirror. */
+/* A rough conductor or a mirror. */
 static bool put_metal(struct writer *w, uint32_t index, struct err *e)
 {
     const struct material *m = &w->s->materials[index];
@@ -153,7 +155,7 @@ static bool put_material(struct writer *w, uint32_t index, struct err *e)
     return ok;
 }
 
-/* Binary PLY of an object: three vertices of its own for each triangle. */
+/* Writes an object as binary PLY; each triangle has three vertices of its own. */
 static bool write_mesh(const struct writer *w, const struct object *o, const char *ending,
                        bool smooth, struct err *e)
 {
@@ -201,7 +203,8 @@ static bool put_object(struct writer *w, uint32_t index, struct err *e)
     const struct material *m = &w->s->materials[o->material];
     char ending[32];
     bool smooth = features_are_smooth(w->s, o->first_triangle, o->num_triangles);
-    /* The side that glows is the geometric normal's for us, the shading normal's for Mitsuba. */
+    /* The emitting side is given by the geometric normal for us, by the shading normal in
+     * Mitsuba. */
     if (smooth && !rgb_is_zero(m->radiance)) {
         smooth = false;
         if (m->kind != MATERIAL_DIFFUSE || !rgb_is_zero(m->reflectance))
@@ -229,8 +232,9 @@ static bool put_object(struct writer *w, uint32_t index, struct err *e)
     return true;
 }
 
-/* Mitsuba's image: columns in the other direction around, rows at theta = pi r/(H-1). With two rows
- * for each of ours every kink of our interpolation falls on a row or column, and the two agree. */
+/* In Mitsuba's environment image columns run in the opposite direction, and row r is at theta = pi
+ * r/(H-1). With two rows for each of ours every kink of our interpolation falls on a row or column,
+ * so that both interpolations agree. */
 static bool put_sky_image(struct writer *w, int width, int height, struct err *e)
 {
     const int rows = 2 * height + 1;
@@ -239,8 +243,8 @@ static bool put_sky_image(struct writer *w, int width, int height, struct err *e
         return err_set(e, "out of memory");
     for (int y = 0; y < rows; y++)
         for (int x = 0; x < width; x++) {
-            /* Next to the poles, where our interpolation is constant, directions keep their
-             * longitude. */
+            /* Clamped next to the poles, where our interpolation is constant in theta, so that the
+             * direction keeps its longitude. */
             double row = fmin(fmax(y, 0.5), rows - 1.5), theta = M_PI * row / (rows - 1);
             double phi = 2 * M_PI * (width - 1 - x + 0.5) / width;
             vec3 d = v3((float)(-cos(phi) * sin(theta)), (float)cos(theta),
@@ -308,7 +312,7 @@ static bool put_scene(struct writer *w, int depth, struct err *e)
     mitsuba_text(w->xml, "default", "seed", "0");
     mitsuba_begin(w->xml, "integrator", "path", NULL, NULL);
     mitsuba_integer(w->xml, "max_depth",
-                    depth + 1); /* counts the light that is seen directly as 1 */
+                    depth + 1); /* light seen directly counts as depth 1 */
     mitsuba_integer(w->xml, "rr_depth", 1000000);
     mitsuba_end(w->xml);
     put_camera(w);
@@ -322,7 +326,7 @@ static bool put_scene(struct writer *w, int depth, struct err *e)
     return ok;
 }
 
-/* Mitsuba's box is one pixel wide, and its Gauss ends at four sigmas. */
+/* Mitsuba's box is one pixel wide, and its Gauss has a radius of 4 sigma. */
 static bool check_filter(const struct pixel_filter *f, struct err *e)
 {
     char text[PIXEL_FILTER_TEXT];

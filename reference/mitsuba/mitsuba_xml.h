@@ -7,20 +7,21 @@
 
 #include <libxml/xmlwriter.h>
 
-/* libxml2 fails only out of memory: `failed` holds until mitsuba_write(). */
+/* libxml2 fails only when out of memory; `failed` records that until mitsuba_write() reports it. */
 struct mitsuba_xml {
     xmlBufferPtr buffer;
     xmlTextWriterPtr w;
     bool failed;
 };
 
-/* Opens <scene>; free with mitsuba_free(), also on failure. */
+/* Opens <scene>. The caller calls mitsuba_free(), also on failure; until then *x must not move, as
+ * libxml2 has the address of `failed`. */
 NODISCARD bool mitsuba_new(struct mitsuba_xml *x, struct err *e);
 /* Closes it and writes the file, by rename. */
 NODISCARD bool mitsuba_write(struct mitsuba_xml *x, const char *path, struct err *e);
 void mitsuba_free(struct mitsuba_xml *x);
 
-/* <tag type="type" key="value">, without the attributes that are NULL; up to mitsuba_end(). */
+/* <tag type="type" key="value">, without NULL attributes; mitsuba_end() closes it. */
 void mitsuba_begin(struct mitsuba_xml *x, const char *tag, const char *type, const char *key,
                    const char *value);
 void mitsuba_end(struct mitsuba_xml *x);
@@ -32,7 +33,7 @@ void mitsuba_real(struct mitsuba_xml *x, const char *tag, const char *name, doub
 void mitsuba_rgb(struct mitsuba_xml *x, const char *name, rgb c);
 /* <tag name="name" x= y= z=/>, tag "point" or "vector". */
 void mitsuba_point(struct mitsuba_xml *x, const char *tag, const char *name, vec3 v);
-/* to_world by the images of +X, +Y, +Z and the origin. */
+/* The to_world transform that maps +X, +Y, +Z and the origin to these. */
 void mitsuba_transform(struct mitsuba_xml *x, vec3 to_x, vec3 to_y, vec3 to_z, vec3 o);
 
 #endif

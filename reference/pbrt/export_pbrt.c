@@ -13,7 +13,7 @@
 struct writer {
     FILE *f;
     const struct scene *s;
-    const char *path; /* of the text */
+    const char *path; /* of the scene file */
 };
 
 static void put3(const struct writer *w, const char *type, const char *name, double x, double y,
@@ -32,7 +32,7 @@ static void put_point(const struct writer *w, const char *name, vec3 p)
     put3(w, "point3", name, (double)p.x, (double)p.y, (double)p.z);
 }
 
-/* pbrt's Gauss is ours: less its value at the radius. */
+/* pbrt's Gauss is defined like ours: minus its value at the radius. */
 static void put_filter(const struct writer *w, const struct pixel_filter *f)
 {
     static const char *const names[] = {"box", "triangle", "gaussian"};
@@ -44,7 +44,7 @@ static void put_filter(const struct writer *w, const struct pixel_filter *f)
     fputs("\n", w->f);
 }
 
-/* World to camera, which looks along +Z with +X to the right; by columns. */
+/* The world-to-camera matrix, column by column; the camera looks along +Z with +X to the right. */
 static void put_camera(const struct writer *w, const struct camera *c)
 {
     const vec3 row[3] = {c->right, c->up, neg(c->backward)};
@@ -130,18 +130,18 @@ static void put_metal(const struct writer *w, const struct material *m)
                 (double)m->alpha);
 }
 
-/* Without a type: pbrt does not have it. */
+/* Kinds without a type do not exist in pbrt. */
 static const struct {
     const char *type;
-    const char *(*missing)(const struct material *m); /* NULL: it has all of these */
+    const char *(*missing)(const struct material *m); /* what pbrt lacks of a material; NULL: nothing */
     void (*put)(const struct writer *w, const struct material *m);
 } KIND[NUM_MATERIAL_KINDS] = {[MATERIAL_DIFFUSE] = {"diffuse", NULL, put_diffuse},
                               [MATERIAL_MIRROR] = {"conductor", what_mirrors_lack, put_metal},
                               [MATERIAL_GLASS] = {"dielectric", what_glass_lacks, put_glass},
                               [MATERIAL_MICROFACET] = {"conductor", what_metals_lack, put_metal}};
 
-/* A reflectance below 1 at every angle, which no index of refraction has: pbrt takes one of the two at random, the second with
- * the probability of `amount`. What it calls 1 is 0.9999. */
+/* A reflectance below 1 at every angle, which no index of refraction gives, as a mix: pbrt picks one of two materials
+ * at random, the second (black) with probability `amount`. Its reflectance of 1 is really 0.9999. */
 static void put_part(const struct writer *w, uint32_t index, double reflectance)
 {
     fprintf(w->f, "MakeNamedMaterial \"material_%u_black\" \"string type\" [\"diffuse\"]", index);
@@ -216,7 +216,7 @@ static void put_object(const struct writer *w, const struct object *o)
     fputs("AttributeEnd\n", w->f);
 }
 
-/* The direction of a point of the unit square in pbrt's map of the sphere, which keeps areas [Clarberg08]. */
+/* The direction of a point of the unit square in pbrt's equal-area mapping of the sphere [Clarberg08]. */
 static vec3 square_to_sphere(double x, double y)
 {
     double u = 2 * x - 1, v = 2 * y - 1, from_rim = 1 - (fabs(u) + fabs(v));
@@ -226,7 +226,7 @@ static vec3 square_to_sphere(double x, double y)
               (float)copysign(1 - r * r, from_rim));
 }
 
-/* pbrt looks texels up without interpolation: each of ours is so many times as high and as wide as one of its image. */
+/* pbrt does not interpolate texels: one texel of ours becomes up to so many of its image in each direction. */
 enum { TEXELS_PER_ROW = 16, MOST_TEXELS = 4096, MOST_ROWS = 512 };
 
 static bool put_sky_image(const struct writer *w, uint32_t rows, struct err *e)

@@ -9,8 +9,8 @@
 #include <errno.h>
 #include <string.h>
 
-/* Of the extent: the distance of the black sheet behind a one-sided emitter. mesh2 vertices are
- * float32, 1e-7 of the extent. */
+/* Distance of the black sheet behind a one-sided emitter, relative to the extent. mesh2 vertices are
+ * float32, precise to 1e-7 of the extent. */
 #define BACKING 2e-5
 
 struct povray_variant povray_variant_plain(void)
@@ -31,7 +31,7 @@ struct look {
     const char *flags;
 };
 
-/* Emission is multiplied by the pigment, so it is divided by it here. */
+/* POV-Ray multiplies emission by the pigment, so we divide by it. boost: factor of the albedo. */
 static void put_surface(const struct povray_writer *w, const struct look *l, double boost)
 {
     const rgb albedo = l->albedo, radiance = l->radiance;
@@ -69,7 +69,7 @@ static void put_mirror(const struct povray_writer *w, const struct look *l)
     fputs(" } }\n", w->f);
 }
 
-/* The fresnel keyword wants conserve_energy to take from the refracted ray what is reflected. */
+/* With `fresnel`, conserve_energy is needed to subtract the reflected light from the refracted ray. */
 static void put_glass(const struct povray_writer *w, const struct material *m)
 {
     fprintf(w->f,
@@ -155,8 +155,8 @@ static void put_sphere(const struct povray_writer *w, const struct sphere *b, do
     fputs("sphere { ", w->f);
     povray_put(w, d3_of(b->centre));
     fprintf(w->f, ", %.9g\n", b->radius + b->normal_out * offset);
-    /* A ray that begins inside a body makes POV-Ray take the inner reflections of glass in there for
-     * zero; `inverse` has the eye outside. */
+    /* For rays that start inside a body, POV-Ray takes internal reflection in glass inside that body to be
+     * zero; `inverse` makes the eye count as outside. */
     if (length(sub(w->eye, b->centre)) < b->radius)
         fputs("  inverse\n", w->f);
 }
@@ -178,8 +178,8 @@ static void put_shape(const struct povray_writer *w, const struct shape *s, doub
     put_look(w, l);
 }
 
-/* A lamp. The light sources do the lighting, so diffuse surfaces must not see the glow; what stops
- * them from it is not there for reflected and refracted rays. */
+/* A lamp. The light sources do the lighting, so diffuse surfaces must not see the glow; the shield that
+ * hides it from them does not exist for reflected and refracted rays. */
 static void put_lamp(const struct povray_writer *w, const struct shape *s, rgb radiance)
 {
     double sheet = BACKING * w->plan->extent;
@@ -198,7 +198,7 @@ static void put_lamp(const struct povray_writer *w, const struct shape *s, rgb r
     put_shape(w, s, -sheet, &black);
 }
 
-/* POV-Ray's light comes straight through glass; ours does not come through, it is found by paths. */
+/* POV-Ray's shadow rays pass straight through glass, ours are blocked: so glass gets an opaque shadow. */
 static void put_glass_body(const struct povray_writer *w, const struct shape *s,
                            const struct material *m)
 {

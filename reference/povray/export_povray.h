@@ -8,8 +8,8 @@
 
 #include <stdio.h>
 
-/* Where the spotlights of a lamp are. Lamps that are no rectangles have evenly spread points
- * (povray_lamp_points()) by every rule. */
+/* Where the spotlights of a lamp are placed. Lamps that are not rectangles have evenly spread points
+ * (povray_lamp_points()) under every rule. */
 enum povray_rule {
     POVRAY_GAUSS, /* rectangles: pairs of cells hold the 2-point Gauss rule (lamp_cells is even) */
     POVRAY_SHIFT, /* rectangles: one point in each cell, at the same place in all of them. The place
@@ -22,25 +22,25 @@ struct povray_variant {
     /* The whole scene and camera, turned about the origin: v' = rotation v. Row-major, orthonormal,
      * determinant +1. The image stays; POV-Ray's directions relative to the scene do not. */
     double rotation[3][3];
-    int pass;       /* of the plan */
+    int pass;       /* index into the plan's passes */
     int lamp_cells; /* a lamp is lamp_cells x lamp_cells spotlights */
     enum povray_rule rule;
-    double lamp_shift[3]; /* in [0,1); of POVRAY_GAUSS for lamps that are no rectangles */
+    double lamp_shift[3]; /* in [0,1); with POVRAY_GAUSS for lamps other than rectangles */
     uint64_t lamp_seed;   /* of POVRAY_JITTER */
-    /* Moves the window right and up; 1 is the width, the height of the whole image. */
+    /* Moves the window right and up, in units of the whole image's width and height. */
     double shift_x, shift_y;
     bool indirect; /* false: no light from diffuse surface to diffuse surface */
     /* Mirrors and glass are followed as far as the pass with indirect light follows them, so that an
      * image without it can be subtracted. */
     bool indirect_levels;
-    /* Probability in [0,1) that a reflecting point absorbs all light; the others reflect
-     * 1/(1-roulette) times as much. Keeps the depths of a path apart where no path could end
-     * otherwise. Used only where there is indirect light and it is noisy. */
+    /* Russian roulette: probability in [0,1) that a reflecting point absorbs all light; otherwise it
+     * reflects 1/(1-roulette) times as much. Decorrelates the depths of a path where no path would
+     * end otherwise (README.md, "Closed rooms"). Used only if there is indirect light with noise. */
     double roulette;
     double scale; /* POV-Ray's number = scale x radiance */
 };
 
-/* The variant for people: first pass, unrotated, 16 x 16 Gauss lamps, whole depth, scale 1. */
+/* The variant for `assay export`: first pass, unrotated, 16 x 16 Gauss lamps, all bounces, scale 1. */
 struct povray_variant povray_variant_plain(void);
 
 /* Writes the scene file; the first lines say with which command line to render it. Fails as

@@ -13,7 +13,7 @@ struct povray_writer {
     const struct povray_passes *plan;
     const struct povray_pass *pass;
     bool radiosity;
-    bool hide_reflections; /* total reflection has to find nothing */
+    bool hide_reflections; /* totally reflected rays must find nothing */
     double roulette;
     vec3 eye;
 };
@@ -31,7 +31,7 @@ static inline void povray_put(const struct povray_writer *w, dvec3 p)
             r[1][0] * p.x + r[1][1] * p.y + r[1][2] * p.z + 0.0,
             r[2][0] * p.x + r[2][1] * p.y + r[2][2] * p.z + 0.0);
 }
-/* before "<r,g,b>" after. */
+/* Prints `before`, "<r,g,b>" and `after`. */
 static inline void povray_put_rgb(const struct povray_writer *w, const char *before, double r,
                                   double g, double b, const char *after)
 {

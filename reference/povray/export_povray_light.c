@@ -8,8 +8,8 @@
 #include <assert.h>
 #include <gsl/gsl_math.h>
 
-/* Of the extent: the distance at which a light source stops growing. POV-Ray's falloff is
- * 2 / (1 + (r/d)^2), so the inverse square law is wrong by (d/r)^2. */
+/* fade_distance d, relative to the extent. POV-Ray's falloff is 2 / (1 + (r/d)^2), a relative
+ * (d/r)^2 below the inverse square law. */
 #define FADE 1e-6
 
 /* Position of node i of n on [0,1]: pairs of cells with the 2-point Gauss rule. */
@@ -18,7 +18,7 @@ static double gauss2(int i, int n)
     return (2 * (i / 2) + 1 + (i % 2 == 0 ? -1 : 1) / sqrt(3.0)) / n;
 }
 
-/* The light of one of n points: its colour times its falloff is radiance x area / n. */
+/* The spotlight at one of n points: colour times falloff is radiance x area / (n pi r^2). */
 static void put_lamp_head(const struct povray_writer *w, const struct povray_lamp *l,
                           uint32_t index, const char *parameters, int n)
 {
@@ -149,7 +149,7 @@ void povray_put_lights(const struct povray_writer *w)
         case LIGHT_TRIANGLES:
         case LIGHT_SPHERE:
             if (!povray_lamp(w->s, l, &lamp))
-                break; /* it glows */
+                break; /* not a lamp: it only glows */
             if (lamp.kind == POVRAY_RECTANGLE)
                 put_rectangle(w, &lamp, i);
             else
@@ -164,8 +164,8 @@ static void put_entry(const struct povray_writer *w, double at, rgb c)
     fprintf(w->f, "[%.9g rgb S*<%.9g,%.9g,%.9g>]", at, (double)c.r, (double)c.g, (double)c.b);
 }
 
-/* A row of texels as a map around the circle, linear between their centres; its two ends meet half
- * way between the last and the first. */
+/* A row of texels as a color_map around the circle, linear between texel centres; its two ends meet
+ * halfway between the last and the first texel. */
 static void put_sky_row(const struct povray_writer *w, const rgb *texel, uint32_t width)
 {
     rgb seam = rgb_scale(rgb_add(texel[0], texel[width - 1]), 0.5f);

@@ -1,4 +1,4 @@
-/* Drives POV-Ray: the images of a povray_replicates, rendered side by side. */
+/* The POV-Ray driver: renders the images of a povray_replicates in parallel. */
 #include "povray_replicates.h"
 #include "reference/base/process.h"
 
@@ -17,14 +17,14 @@ struct crew {
     const struct povray_replicates *set;
     const struct reference_job *job; /* of the set */
     const char *program;
-    int first; /* of the images that are wanted */
+    int first; /* number of the first image wanted */
     pthread_mutex_t lock;
     bool failed;
     struct err why; /* of the first failure */
 };
 
-/* An image with radiosity must say in its log that no sample was kept; a cache would be a bias that
- * nobody sees. */
+/* With radiosity, POV-Ray's log must say that no sample was kept: reusing samples would be an unnoticed
+ * bias. */
 static bool check_log(const char *path, struct err *e)
 {
     FILE *f = fopen(path, "r");
@@ -77,8 +77,8 @@ static bool add_image(const struct crew *w, const struct povray_image *p, const 
 
 enum { MAX_STARTS = 10 /* of one image */ };
 
-/* On a busy machine POV-Ray gives up before it has begun, when its own threads start too slowly. That
- * says nothing about the image, so it is asked again. */
+/* On a busy machine POV-Ray may give up before rendering because its threads start too slowly. That says
+ * nothing about the image, so it is started again. */
 static bool run_engine(const struct process *run, struct err *e)
 {
     for (int attempt = 1;; attempt++) {
@@ -117,7 +117,7 @@ static bool render_one(struct crew *w, const struct povray_image *p, float sign,
            add_image(w, p, exr.s, sign, out, e) && fs_remove_tree(dir.s, e);
 }
 
-/* Adds its passes up, box-averaged to the job's size, into a file. */
+/* Writes image t: the sum of its passes, box-averaged to the job's size. */
 static bool run_task(struct crew *w, int t, struct err *e)
 {
     char path[REPLICATE_IMAGE_PATH];
@@ -161,7 +161,7 @@ static void work(void *ctx, size_t first, size_t last)
     }
 }
 
-/* "POV-Ray 3.7.0.10.unofficial": the first line that begins so. */
+/* The first line that begins with "POV-Ray ", such as "POV-Ray 3.7.0.10.unofficial". */
 static bool engine_version(const struct crew *w, char line[128], struct err *e)
 {
     const char *argv[] = {w->program, "--version", NULL};
@@ -220,7 +220,7 @@ static bool count(const struct reference_job *job, int *num, struct err *e)
     return true;
 }
 
-/* One image of each of the three kinds in each pass; the others differ from them by the seed. */
+/* One image of each of the three kinds in each pass; the others differ from these only by the seed. */
 static bool write_key(const struct reference_job *job, const char *path, struct err *e)
 {
     const struct suite_scene *s = job->suite;

@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Of the extent: how far bodies that touch may reach into each other. */
+/* How far touching bodies may overlap, relative to the extent. */
 #define TOUCH 1e-4
 
 struct box {
@@ -52,7 +52,7 @@ static int by_ends(const void *a, const void *b)
     return memcmp(a, b, 2 * sizeof(vec3));
 }
 
-/* *is_closed: each edge is there once in each direction, and the volume is positive. Fails only out of memory. */
+/* *is_closed: each edge occurs exactly once in each direction, and the volume is positive. Fails only out of memory. */
 static bool look_if_closed(const struct scene *s, const struct object *o, bool *is_closed,
                            struct err *e)
 {
@@ -105,7 +105,7 @@ static bool collides(const struct object *o, const char *with, struct err *e)
     return err_set(e, "POV-Ray: %s may be inside the glass '%s' or touch it", with, o->name);
 }
 
-/* The triangles of object o, as one body. */
+/* Checks the triangles of object o as one body. */
 static bool check_mesh(const struct scene *s, const struct object *o, vec3 eye, double touch,
                        struct err *e)
 {
@@ -163,7 +163,7 @@ static bool check_ball(const struct scene *s, const struct object *o, uint32_t b
     return true;
 }
 
-/* A mirror, glass or environment, which total reflection would show. */
+/* Is there a mirror, glass or environment, which would make total reflection visible? */
 static bool shows_reflection(const struct scene *s)
 {
     bool shows = s->environment != NULL;

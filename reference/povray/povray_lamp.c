@@ -10,8 +10,8 @@ static bool find_rectangle(const struct scene *s, const struct light *l, struct 
     const vec3 *p = &s->position[3 * (size_t)l->first], *q = p + 3;
     vec3 n = cross(sub(p[1], p[0]), sub(p[2], p[0]));
     float size = length(sub(p[1], p[0])) + length(sub(p[2], p[0]));
-    /* One corner of each triangle is its own; the fourth corner mirrors it in the middle of the
-     * shared edge. */
+    /* One corner of each triangle is not shared; the second triangle's is the mirror image of the
+     * first's in the midpoint of the shared edge. */
     for (int i = 0; i < 3; i++) {
         vec3 own = p[i], b = p[(i + 1) % 3], c = p[(i + 2) % 3];
         vec3 fourth = sub(add(b, c), own);

@@ -1,5 +1,5 @@
-/* Emitters that POV-Ray can be given as light sources: those that reflect nothing and emit from one
- * side. Each point of such a surface is a spotlight whose light falls off with the cosine. */
+/* Lamps: emitters that can be expressed as POV-Ray light sources, as they reflect nothing and emit from
+ * one side. Sample points of such a surface become spotlights with a cosine lobe. */
 #ifndef ASSAY_POVRAY_LAMP_H
 #define ASSAY_POVRAY_LAMP_H
 
@@ -20,13 +20,13 @@ struct povray_lamp {
     uint32_t first, count;     /* mesh: triangles; ball: index of the sphere, 1 */
 };
 
-/* True if the light is one; fills *out. */
+/* Is the light a lamp? If so, fills *out. */
 bool povray_lamp(const struct scene *s, const struct light *l, struct povray_lamp *out);
 
 /* n points on a ball or mesh, uniform over its area, and the unit normals there. Evenly spread: for
  * a ball a spiral of golden angles, for a mesh equal steps of area with golden-ratio places in the
- * triangle. shift, three numbers in [0,1), moves the whole set; where they are uniformly random, so is
- * every point. */
+ * triangle. shift, three numbers in [0,1), moves the whole set; if it is uniformly random, so is every
+ * point. */
 void povray_lamp_points(const struct scene *s, const struct povray_lamp *l, const double shift[3],
                         int n, vec3 *p, vec3 *normal);
 

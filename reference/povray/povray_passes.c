@@ -10,7 +10,7 @@
 #include <assert.h>
 #include <gsl/gsl_math.h>
 
-/* Furnaces agree to 3e-5 up to here; beyond, nobody has looked. */
+/* Furnaces agree to 3e-5 up to this depth; larger ones are untested. */
 #define MAX_RECURSION 20
 /* max_trace_level: mirrors and glass agree up to here, at 250 POV-Ray runs out of stack. */
 #define MAX_LEVELS 60
@@ -34,7 +34,8 @@ static bool reflects_or_glows(const struct material *m)
     return reflects(m) || !rgb_is_zero(m->radiance);
 }
 
-/* Of all surfaces that are `counted`. A plane does not see itself: there is no indirect light to wait for. */
+/* Do all surfaces for which counted() holds lie in one plane? A plane does not see itself, so it has no indirect
+ * light. */
 static bool is_one_plane(const struct scene *s, double extent,
                          bool (*counted)(const struct material *))
 {
@@ -97,11 +98,11 @@ static bool check_camera(const struct scene *s, const struct camera *c, double e
     return features_check_clipping("POV-Ray", s, c, e);
 }
 
-/* What there is in a scene, of objects that reflect and of lights. */
+/* Which kinds of reflecting objects and of lights a scene contains. */
 struct census {
     bool diffuse, specular;
     bool sources; /* point, spot, directional lights and lamps */
-    bool glow;    /* emitters that are no lamps, and the environment */
+    bool glow;    /* emitters that are not lamps, and the environment */
     int lamps;
 };
 
@@ -186,8 +187,8 @@ static bool plan_lights(const struct scene *s, struct povray_passes *p, struct c
     return true;
 }
 
-/* surfaces: of the longest path, the one that emits included. A path that leaves its j-th diffuse
- * surface begins at level 3j/2 and has surfaces - 1 - j mirrors at most before it. */
+/* surfaces: how many the longest path has, the emitting one included. After its j-th diffuse surface a
+ * path is at trace level 3j/2 and has at most surfaces - 1 - j mirrors ahead of it. */
 static void set_levels(struct povray_pass *pass, bool specular, int surfaces)
 {
     pass->levels = specular ? surfaces : MAX_LEVELS;
@@ -209,7 +210,7 @@ static void plan_passes(const struct scene *s, const struct census *n, int depth
         seen.recursion = depth;
     else if (n->diffuse && n->specular && n->lamps > 0 && depth > 1)
         seen.recursion =
-            depth - 1; /* a mirror or glass is the last, or the lamp has been sampled */
+            depth - 1; /* the last surface is a mirror or glass; else the lamp was sampled */
     bool needs_lit = n->sources && n->diffuse && depth > 0;
     bool needs_seen = !needs_lit || n->glow || n->lamps > 0;
     set_levels(&lit, n->specular, depth);

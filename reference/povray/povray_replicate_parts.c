@@ -24,7 +24,7 @@ static int reverse5(int i)
     return (i & 1) << 4 | (i & 2) << 2 | (i & 4) | (i & 8) >> 2 | (i & 16) >> 4;
 }
 
-/* By (u, v) - 1/2 sub-pixels. */
+/* Shifts the window by (u, v) - 1/2 sub-pixels. */
 static void set_shift(struct povray_image *p, int width, int height, double u, double v)
 {
     p->variant.shift_x = (u - 0.5) / (p->grid * width);
@@ -36,7 +36,7 @@ static double scale_within_octave(const struct povray_passes *plan, double u)
     return POVRAY_TOP_VALUE / plan->radiance * exp2(u);
 }
 
-/* As many cells a side as keep all lamps together below `most` spotlights. */
+/* The first choice of cells per side with which all lamps together have at most `most` spotlights. */
 static int cells(const struct povray_passes *plan, const int *choice, int most)
 {
     while (choice[1] != 0 && plan->num_lamps * *choice * *choice > most)
@@ -55,7 +55,7 @@ struct povray_image povray_window(const struct povray_passes *plan, int width, i
     p.variant.pass = pass;
     p.variant.lamp_cells = cells(plan, (const int[]){POVRAY_WINDOW_CELLS, 8, 4, 2, 0}, 320);
     p.variant.rule = p.variant.lamp_cells == POVRAY_WINDOW_CELLS ? POVRAY_GAUSS : POVRAY_SHIFT;
-    /* Each an order of its own of the same 32 places; multiplying by an odd number permutes them. */
+    /* Three permutations of the same 32 positions: multiplying by an odd number permutes residues mod 32. */
     p.variant.lamp_shift[0] = (13 * j % 32 + 0.5) / POVRAY_WINDOWS;
     p.variant.lamp_shift[1] = (reverse5(13 * j % 32) + 0.5) / POVRAY_WINDOWS;
     p.variant.lamp_shift[2] = (11 * j % 32 + 0.5) / POVRAY_WINDOWS;

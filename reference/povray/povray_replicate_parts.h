@@ -21,7 +21,7 @@ enum {
     POVRAY_WINDOWS = 32,
     POVRAY_WINDOW_GRID = 2,   /* sub-pixels a side */
     POVRAY_WINDOW_CELLS = 16, /* spotlights a side for one lamp, 2-point Gauss rule; with more lamps
-                                 fewer, at random points that each window has of its own */
+                                 fewer, in a regular grid that each window shifts differently */
     POVRAY_JITTER_CELLS = 3   /* the same in a replicate, at most; one random point in each cell */
 };
 /* Probability of the roulette in a replicate's two images. */
@@ -37,12 +37,11 @@ struct povray_image {
     struct povray_variant variant;
 };
 
-/* Both are of pass `pass` of the plan.
- * Window j, 0 <= j < POVRAY_WINDOWS, of an image of width x height. The shifts are a Hammersley set
- * over one sub-pixel. */
+/* Window j, 0 <= j < POVRAY_WINDOWS, of an image of width x height, in pass `pass` of the plan. The
+ * shifts of the windows are a Hammersley set over one sub-pixel. */
 struct povray_image povray_window(const struct povray_passes *plan, int width, int height, int j,
                                   int pass);
-/* One of the two images of replicate i, of which everything random follows from seed. */
+/* One of the two images of replicate i in that pass; everything random in it follows from seed. */
 struct povray_image povray_replicate(const struct povray_passes *plan, int width, int height,
                                      int grid, int i, uint32_t seed, int pass, bool indirect);
 

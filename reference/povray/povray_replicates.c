@@ -1,4 +1,4 @@
-/* What a reference by POV-Ray is of, and how its images become one. */
+/* The images that a POV-Ray reference consists of, and how they are folded. */
 #include "povray_replicates.h"
 
 #include "reference/replicates/independence.h"

@@ -22,12 +22,12 @@ struct povray_image povray_replicates_replicate(const struct povray_replicates *
                                                 bool indirect);
 
 enum { POVRAY_ARGS = 16 /* of the engine's command line, NULL included */ };
-/* In text that belongs to the caller. */
+/* Fills argv, NULL-terminated; it points into `text` and at `program`. */
 void povray_command_line(const struct povray_replicates *s, const char *program,
                          const struct povray_image *p, char text[4][32],
                          const char *argv[POVRAY_ARGS]);
 
-/* As struct engine_driver has it. */
+/* The driver's fold(), see struct engine_driver. */
 NODISCARD bool povray_fold(const struct reference_job *job, const struct replicate_images *images,
                            const json_t *said, struct moments *out, json_t *manifest,
                            struct err *e);

@@ -2,7 +2,8 @@
 
 #include <math.h>
 
-/* Texels first .. first + count - 1 of the endless row, all that a material's triangles show. */
+/* Texels first .. first + count - 1 of the infinitely repeated row: all that a material's triangles
+ * show. */
 struct stretch {
     long first, count;
 };
@@ -21,7 +22,7 @@ static struct stretch stretch_of(const struct scene *s, uint32_t material, const
         }
     if (!(lo <= hi))
         return (struct stretch){0, 1};
-    /* One more to each side, for what is between the outermost centres. */
+    /* One more on each side, for interpolation beyond the outermost centres. */
     long first = (long)floor(lo * n) - 1;
     return (struct stretch){first, (long)floor(hi * n) + 2 - first};
 }
@@ -58,7 +59,8 @@ bool povray_check_textures(const struct scene *s, struct err *e)
     return true;
 }
 
-/* Entries for item k of `count` begin: one at its centre, or two at its edges. Returns how many. */
+/* Positions of the map entries of item k of `count`: its centre or, if nearest, its two edges.
+ * Returns how many. */
 static int entries(long k, long count, bool nearest, double at[2])
 {
     const double n = (double)count;

@@ -7,7 +7,7 @@
 #include <sys/resource.h>
 #include <time.h>
 
-/* One round on 31 bits; each step can be undone, so different x stay different. */
+/* One round of mixing 31 bits; each step is invertible, so different x stay different. */
 static uint32_t mix31(uint32_t x, uint32_t key)
 {
     const uint32_t mask = 0x7fffffff;
@@ -19,7 +19,7 @@ static uint32_t mix31(uint32_t x, uint32_t key)
     return x ^ x >> 15;
 }
 
-/* A permutation of the 31-bit numbers, another one for each seed. */
+/* A permutation of the 31-bit numbers that depends on the seed. */
 static uint32_t permute31(uint32_t x, uint32_t seed)
 {
     x = mix31(x, (seed & 0xffff) + 0x3c6ef372);
@@ -31,7 +31,7 @@ uint32_t replicate_seed(uint32_t seed, int k)
 {
     assert(k >= 0 && k < INT32_MAX);
     uint32_t x = permute31((uint32_t)k, seed);
-    return x != 0 ? x : permute31(INT32_MAX, seed); /* which no k has taken */
+    return x != 0 ? x : permute31(INT32_MAX, seed); /* a value that no k has */
 }
 
 static double clock_s(clockid_t id)
@@ -41,7 +41,7 @@ static double clock_s(clockid_t id)
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-/* Of this process and of all children that were waited for. */
+/* CPU seconds of this process and of all children that were waited for. */
 static double cpu_s(void)
 {
     struct rusage r;

@@ -8,8 +8,8 @@
 
 struct reference_options {
     uint32_t seed; /* replicate k's own seed is a hash of (seed, k) */
-    /* k of the first of ref->replicates: more of what an earlier call began, or, far from all that
-     * has been used, a fresh start. */
+    /* k of the first of the ref->replicates: the next one continues an earlier call, a number beyond all
+     * that have been used gives fresh replicates. */
     int first_replicate;
     int threads;
     double timeout_s; /* of one engine process; it is killed (whole process group) after that */
@@ -31,41 +31,43 @@ struct reference_job {
     const char *dir;             /* empty working directory of this job */
 };
 
-/* Seed of replicate k >= 0: 31 bits, well spread, never 0, and another one for each k. */
+/* Seed of replicate k >= 0: 31 bits, well spread, never 0, and different for each k. */
 uint32_t replicate_seed(uint32_t seed, int k);
 
-/* An engine. Rendering and folding share nothing but images and what was said, so that they can be done on different
- * machines. Each fails with one line if the engine cannot express the scene at all. */
+/* An engine. Rendering and folding share nothing but the images and the object `said`, so that they can run on
+ * different machines. Each fails with one line if the engine cannot express the scene at all. */
 struct engine_driver {
-    const char *const *scripts; /* what it runs of share_dir, NULL at the end; or NULL */
+    const char *const *scripts; /* the scripts in share_dir that it runs, NULL at the end; or NULL */
     const char *prefix;         /* of an image's file, replicate_images_path() */
-    bool below_zero;            /* images are differences */
+    bool below_zero;            /* images are differences and may be negative */
     /* How many images the fold takes. */
     bool (*count)(const struct reference_job *job, int *num, struct err *e);
-    /* Images first .. last-1 into files of job->dir that are numbered from 0. Adds to `said` what the manifest needs and only
-     * the engine knows: "version", "binary_sha256" and more. */
+    /* Renders images first .. last-1 into files of job->dir, numbered from 0. Adds to `said` what the manifest needs
+     * and only the engine knows: "version", "binary_sha256" and more. */
     bool (*render)(const struct reference_job *job, int first, int last, json_t *said,
                    struct err *e);
-    /* All images, in their order, into *out (unit "replicate", or "exact" where the engine's answer has no noise); adds to the
-     * manifest "version", "binary_sha256", "command", "settings" (object), "seeds" (array), and "independence".
-     * Calls opt->on_replicate. */
+    /* Folds all images, in their order, into *out (unit "replicate", or "exact" if the engine's result has no noise);
+     * adds to the manifest "version", "binary_sha256", "command", "settings" (object), "seeds" (array), and
+     * "independence". Calls opt->on_replicate. */
     bool (*fold)(const struct reference_job *job, const struct replicate_images *images,
                  const json_t *said, struct moments *out, json_t *manifest, struct err *e);
-    /* Writes to path what decides the images besides the program, the scripts and the suite's settings. */
+    /* Writes to path what determines the images besides program, scripts and settings of the suite; reference_key()
+     * hashes it. */
     bool (*write_key)(const struct reference_job *job, const char *path, struct err *e);
 };
 
-/* Of each engine with goldens, in reference/NAME/NAME_driver.c. */
+/* The driver of each engine with goldens, in reference/NAME/NAME_driver.c. */
 #define ENGINE_DRIVER(name, ...) extern const struct engine_driver name##_driver;
 ENGINES_WITH_GOLDENS(ENGINE_DRIVER)
 #undef ENGINE_DRIVER
 
-/* All of it here: count, render, fold. */
+/* Counts, renders and folds all images on this machine. */
 NODISCARD bool engine_driver_render(const struct engine_driver *driver,
                                     const struct reference_job *job, struct moments *out,
                                     json_t *manifest, struct err *e);
 
-/* Date (UTC), and the seconds since the start once it is stopped; CPU: of this process and all children that were waited for. */
+/* The start's date (UTC) and, once stopped, the elapsed wall and CPU seconds, of this process and all children waited
+ * for. */
 struct timing {
     char date[32];
     double wall_s, cpu_s;

@@ -34,7 +34,7 @@ void replicates_free(struct replicates *r)
     *r = (struct replicates){0};
 }
 
-/* Sums over blocks of what the moments over permutations are made of (see moments_of()). */
+/* Sums over blocks from which z_of() computes the moments over permutations. */
 struct sums {
     size_t k;
     double *g;     /* k x k, lower triangle: sum of G_b */
@@ -43,7 +43,7 @@ struct sums {
     int pixels, blocks;
 };
 
-/* e of one pixel, or false where it has no noise. */
+/* The residuals e[k] of one pixel; false if it has no noise. */
 static bool standardize(const struct replicates *r, size_t pixel, double *e)
 {
     size_t stride = (size_t)r->width * (size_t)r->height;
@@ -54,7 +54,7 @@ static bool standardize(const struct replicates *r, size_t pixel, double *e)
         e[k] = r->luminance[(size_t)k * stride + pixel] - mean;
         m2 += e[k] * e[k];
     }
-    /* Equal floats leave only what rounding makes of their mean. */
+    /* Equal floats differ from their mean only by rounding. */
     if (!(m2 > 1e-28 * mean * mean * r->num))
         return false;
     for (int k = 0; k < r->num; k++)
@@ -62,7 +62,7 @@ static bool standardize(const struct replicates *r, size_t pixel, double *e)
     return true;
 }
 
-/* Lower triangle of e e', e being n pixels of k numbers each. */
+/* Adds the lower triangle of the sum of e e' over n pixels, each a vector e of k numbers. */
 static void add_products(double *g, const double *e, size_t n, size_t k)
 {
     for (size_t i = 0; i < k; i++) {
@@ -89,7 +89,7 @@ static void add_block(struct sums *s, const double *e, size_t n)
             s1 += 4 * x * x;
             s->g[i * k + j] += x;
         }
-        /* Residuals add up to 0, so the rest of row i is minus its diagonal. */
+        /* Residuals add up to 0, so the rest of row i adds up to minus its diagonal. */
         double diagonal = s->block[i * k + i];
         s2 += 4 * diagonal * diagonal;
     }
@@ -101,7 +101,7 @@ static void add_block(struct sums *s, const double *e, size_t n)
     s->blocks++;
 }
 
-/* All blocks of the image that have a noisy pixel; e holds a block. */
+/* Adds all blocks of the image that have a noisy pixel; e has room for one block. */
 static void add_blocks(struct sums *s, const struct replicates *r, int side, double *e)
 {
     for (int y0 = 0; y0 < r->height; y0 += side)
@@ -115,7 +115,7 @@ static void add_blocks(struct sums *s, const struct replicates *r, int side, dou
         }
 }
 
-/* Of the weights w: S0 = sum w, S1 = 2 sum w^2, S2 = sum over rows of (2 row sum)^2. */
+/* Sums of the weights w: S0 = sum w, S1 = 2 sum w^2, S2 = sum over rows of (2 row sum)^2. */
 struct weights {
     double s0, s1, s2;
 };
@@ -164,9 +164,8 @@ static void test_neighbours(const struct sums *s, struct independence *out)
     out->neighbours_z = z_of(s, w, 2 * sum);
 }
 
-/* Whole batches only. With m batches of B, mean correlation r within them and mean correlation -1/K under
- * H0, and as Var is estimated from all K: the variance of the mean of B, times B, over Var, is
- * 1 + (B - 1)(r + 1/K) but for terms of 1/K^2. */
+/* Whole batches only. With a mean correlation r within batches of B (-1/K under H0), and Var estimated from all
+ * K replicates, B times the variance of a batch's mean over Var is 1 + (B - 1)(r + 1/K) up to terms of order 1/K^2. */
 static void test_batches(const struct sums *s, struct independence *out)
 {
     size_t k = s->k, b = (size_t)fmax(2, floor(sqrt((double)k))), m = k / b;
@@ -183,7 +182,7 @@ static void test_batches(const struct sums *s, struct independence *out)
 }
 
 /* Pairs of pixels p, q in one square: C = sum over k of e_k(p) e_k(q) has the mean 0 and, over permutations of one
- * against the other, the variance (K-1)^2/(K-1); different pairs are uncorrelated. */
+ * against the other, the variance K - 1; different pairs are uncorrelated. */
 static void measure_square(const struct replicates *r, int side, double *e, double *sum,
                            double *mean, double *se)
 {
@@ -307,7 +306,7 @@ bool independence_check(const struct replicates *r, json_t *manifest, struct err
             "independent pixels would, and intervals would be too narrow",
             t.square_failed, t.square_failed, square_ratio(i, t.square_r[i]));
     }
-    /* Of those that failed, the one that failed most clearly. */
+    /* Reports the test that failed most clearly. */
     double pair = fabs(t.pair_z) / t.pair_limit, neighbours = fabs(t.neighbours_z) / t.limit,
            batches = fabs(t.batches_z) / t.limit;
     if (pair > neighbours && pair > batches)

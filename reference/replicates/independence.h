@@ -1,31 +1,30 @@
 /* Are the replicates of an engine independent of each other? Moments cannot tell: they hold sums. So
  * this looks at the replicates themselves, before they are folded.
  *
- * e[k](p): luminance of replicate k in pixel p, less the mean over the K replicates, over their standard
- * deviation; pixels without noise are left out. Pixels are taken together in square blocks. For each block b the
- * matrix G_b[i][j] = sum over p in b of e[i](p) e[j](p); their sum over N pixels is N times the matrix
- * of correlations r[i][j].
+ * Let e[k](p) be the standardised residual of replicate k in pixel p: its luminance minus the mean over the K
+ * replicates, divided by their standard deviation; pixels without noise are left out. For each square block b of
+ * pixels, G_b[i][j] = sum over p in b of e[i](p) e[j](p). The sum of G_b over all blocks, N pixels, is N times the
+ * matrix of correlations r[i][j].
  *
  * H0: in each block the replicates are exchangeable, and blocks are independent. Then the labels of the replicates
  * may be permuted in each block by itself, and for any fixed symmetric weights w (0 on the diagonal) the
- * mean and variance of T = sum over i, j of w[i][j] G[i][j] over all permutations are exact, whatever the law of
- * the noise [Mantel67, by the moments of CliffOrd81]. T is a sum over many blocks, so
- * z = (T - mean)/sd is compared with the normal law. As residuals are taken from the mean of the same
- * replicates, every r has the mean -1/K under H0, and so has the mean of all of them, always: an error that
- * all replicates share is their bias, and only another image (a closed form, another engine, the same
- * engine with other seeds) can show it.
+ * mean and variance of T = sum over i, j of w[i][j] G[i][j] over all permutations are exact, whatever the distribution
+ * of the noise [Mantel67, by the moments of CliffOrd81]. T is a sum over many blocks, so z = (T - mean)/sd is
+ * compared with the normal distribution. As residuals are taken from the mean of the same replicates, every r has
+ * the expectation -1/K under H0, and the average of all r is -1/K always: an error that all replicates share is
+ * their bias, and only another image (a closed form, another engine, the same engine with other seeds) can show it.
  *
  * Tests, each with a quarter of alpha, the first three two-sided:
- *   pair        the largest |z| of a single r, over K (K-1)/2 pairs: a copy, a seed used twice
- *   neighbours  the mean r of replicates k, k+1: seeds that are too near each other
- *   batches     B Var(mean of B successive replicates) / Var, B near sqrt K; 1 under H0: anything that
- *               comes and goes slowly
- *   pixels      the variance between replicates of the sum over a square of 2, 4, 8 or 16 pixels is no more than
- *               SQUARES_VARY_MOST times the sum of its pixels' variances, H0. Replicates may be independent
- *               without it, but compare_moments() takes pixels for independent: with more, its intervals
- *               would be too narrow, and tests above that take blocks to be independent are off, too.
- * Where pixels are known to share samples ("sharing"), squares may vary as much more, and limits of |z| are wider by its square
- * root, as correlations r between blocks add at most the sum of r^2 < sum of r = sharing to the variance of T. */
+ *   pair        the largest |z| of a single r, over K (K-1)/2 pairs: finds a copy or a seed used twice
+ *   neighbours  the mean r of replicates k, k+1: finds seeds that are too close to each other
+ *   batches     B Var(mean of B successive replicates) / Var, B near sqrt K; 1 under H0: finds slow drifts
+ *   pixels      H0: the variance between replicates of the sum over a square of side 2, 4, 8 or 16 is at most
+ *               SQUARES_VARY_MOST times the sum of its pixels' variances. Independent replicates may violate
+ *               it, but compare_moments() assumes independent pixels: its intervals would then be too narrow,
+ *               and the tests above, which assume independent blocks, would be off, too.
+ * If a known filter makes pixels share samples ("sharing"), squares may vary by that factor more, and limits of |z|
+ * widen by its square root: correlations r between blocks add at most the sum of r^2 < sum of r = sharing to the
+ * variance of T. */
 #ifndef ASSAY_INDEPENDENCE_H
 #define ASSAY_INDEPENDENCE_H
 
@@ -33,13 +32,13 @@
 
 #include <jansson.h>
 
-/* Luminance of replicates; at most MOST_REPLICATES of them are kept, the first. */
+/* The luminance of the first MOST_REPLICATES replicates. */
 enum { MOST_REPLICATES = 1024, NUM_SQUARES = 4 };
 struct replicates {
     int width, height, num, capacity;
     float *luminance; /* num images of width*height */
     double
-        sharing; /* how many times the sum of pixels' variances their sum has by a filter that is known; 0: once */
+        sharing; /* variance of a sum of pixels over the sum of their variances, by a known filter; 0: 1 */
 };
 
 NODISCARD bool replicates_alloc(struct replicates *r, int width, int height, int count,
@@ -47,15 +46,15 @@ NODISCARD bool replicates_alloc(struct replicates *r, int width, int height, int
 void replicates_add(struct replicates *r, const float *pixels_rgb);
 void replicates_free(struct replicates *r);
 
-/* Chance that independent replicates fail, over all four tests. Small, as a whole suite with both engines is
- * rendered again and again, and a replicate that was used twice is seen at any alpha. */
+/* Chance that independent replicates fail any of the four tests. Small, as a whole suite with both engines is
+ * rendered again and again, and a replicate that was used twice is found at any alpha. */
 #define INDEPENDENCE_ALPHA 1e-6
 
-/* An interval may be too narrow by at most the square root of this before the test fails. */
+/* While the test passes, an interval is too narrow by at most about the square root of this. */
 #define SQUARES_VARY_MOST 1.5
 
 struct independence {
-    bool tested;    /* false: fewer than 4 replicates, or than 64 noisy blocks */
+    bool tested;    /* false: fewer than 4 replicates or 64 noisy blocks */
     bool passed;    /* true also where not tested */
     int replicates; /* K */
     int pixels;     /* N */

@@ -14,7 +14,7 @@
 #include <sys/file.h>
 #include <unistd.h>
 
-/* Of one engine's reference. next: of an image that the manifest may not describe yet. */
+/* The files of one engine's reference. next: an image that the manifest may not describe yet. */
 struct place {
     struct path exr, next, manifest;
 };
@@ -26,8 +26,8 @@ static struct place find_place(const char *golden_dir, const char *scene, const 
                           .manifest = fs_path("%s/%s/manifest.json", golden_dir, scene)};
 }
 
-/* Held while the manifest is read, changed and renamed, so that engines of one scene may finish at
- * the same time. Close the descriptor to let go. */
+/* The lock held while the manifest is read, changed and renamed, so that engines of one scene may finish
+ * at the same time. Returns a descriptor that releases it when closed, or -1. */
 static int lock_directory(const char *golden_dir, const char *scene, struct err *e)
 {
     const struct path dir = fs_path("%s/%s", golden_dir, scene);
@@ -46,7 +46,7 @@ static int lock_directory(const char *golden_dir, const char *scene, struct err 
     return -1;
 }
 
-/* *has: it is there and what the entry describes. Fails where it is there and cannot be read. */
+/* *has: the file exists and has the entry's hash. Fails if it exists but cannot be read. */
 static bool look_at_hash(const char *path, const json_t *entry, bool *has, struct err *e)
 {
     char sha256[65];
@@ -60,7 +60,8 @@ static bool look_at_hash(const char *path, const json_t *entry, bool *has, struc
     return true;
 }
 
-/* Which file is the image of an entry: after an interruption it may be the next one still. What cannot be read is not it. */
+/* Which file is the image of an entry: after an interruption it may still be `next`. A file that cannot be read is
+ * not. */
 static const char *image_of(const json_t *entry, const char *exr, const char *next)
 {
     struct err ignored;
@@ -71,7 +72,8 @@ static const char *image_of(const json_t *entry, const char *exr, const char *ne
                : exr;
 }
 
-/* Under the lock nobody writes: an image that waits is what a kill left. That of the manifest takes its place, another goes. */
+/* Under the lock nobody writes, so `next` was left by a killed writer: moved into place if the manifest describes it,
+ * else removed. */
 static bool settle(const json_t *entry, const char *exr, const char *next, struct err *e)
 {
     if (access(next, F_OK) != 0)
@@ -169,7 +171,7 @@ static bool check_string(const json_t *entry, const char *key, const char *want,
     return strcmp(v, want) == 0 || err_set(e, "%s: %s", where, why);
 }
 
-/* Made for this scene file and these settings of the suite. */
+/* Was the entry made for this scene file and these settings of the suite? */
 static bool check_entry(const json_t *entry, const struct suite_scene *scene,
                         const struct suite_reference *ref, const char *where, struct err *e)
 {
@@ -180,7 +182,7 @@ static bool check_entry(const json_t *entry, const struct suite_scene *scene,
         !check_number(entry, "height", scene->height, where, e) ||
         !check_number(entry, "depth", scene->depth, where, e))
         return false;
-    /* 0 of an engine that this program does not know: what its description said then. */
+    /* For an engine that this program does not know, 0 stands for what its description said then. */
     const bool free = engine_with_goldens(ref->engine) == NULL && strcmp(ref->engine, "truth") != 0;
     if ((!(free && ref->replicates == 0) &&
          !check_number(entry, "replicates", ref->replicates, where, e)) ||
@@ -195,7 +197,7 @@ static bool check_entry(const json_t *entry, const struct suite_scene *scene,
                     where));
 }
 
-/* The image is what its manifest says. */
+/* Do the image's size, unit and n agree with its manifest? */
 static bool check_moments(const struct moments *m, const json_t *entry, const char *exr,
                           struct err *e)
 {
@@ -206,7 +208,7 @@ static bool check_moments(const struct moments *m, const json_t *entry, const ch
                        m->height, (long long)width, (long long)height);
     if (!check_string(entry, "unit", m->unit, exr, "its unit is not that of its manifest", e))
         return false;
-    /* As many as the engine saw fit, for each pixel; or no count of anything. */
+    /* "sample": n may differ between pixels; "picture": n is not a count. */
     if (strcmp(m->unit, "sample") == 0 || strcmp(m->unit, "picture") == 0)
         return true;
     double n =
@@ -217,7 +219,7 @@ static bool check_moments(const struct moments *m, const json_t *entry, const ch
     return true;
 }
 
-/* Image and entry belong together, whatever they are of. */
+/* Reads the image if it and the entry belong together, current or not. */
 static bool read_pair(const char *exr, const json_t *entry, struct moments *out, struct err *e)
 {
     char sha256[65];
@@ -315,7 +317,7 @@ static bool is_wanted(const struct suite *suite, const char *scene, const char *
            suite_reference_of(s, engine) != NULL;
 }
 
-/* What one scene's directory holds, by manifest and by image. */
+/* Adds the orphans in one scene's directory, manifest entries and images. */
 static bool add_orphans(const char *golden_dir, const struct suite *suite, const char *scene,
                         json_t *found, struct err *e)
 {

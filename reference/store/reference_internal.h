@@ -5,7 +5,8 @@
 #include "reference_render.h"
 #include "reference/external/engine_bindings.h"
 
-/* Calls act() with the scene open and a directory of its own below opt->work_dir, which stays for inspection if that fails. */
+/* Calls act() with the scene open and a new directory below opt->work_dir, which is removed on success and kept on
+ * failure. */
 NODISCARD bool
 reference_in_directory(const struct suite_scene *scene, const struct suite_reference *ref,
                        const struct reference_options *opt,

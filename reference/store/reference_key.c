@@ -11,10 +11,11 @@
 #include <stdio.h>
 #include <string.h>
 
-/* Raised when a driver makes something else of the same files: other replicates, another fold. */
+/* RECIPE is raised when a driver makes other results from the same files: other replicates, another
+ * fold. */
 enum { RECIPE = 1, MOST_SCRIPTS = 8 };
 
-/* Hashes of the program, of its scripts, and of what the driver says. */
+/* Hashes of the program, of its scripts, and of the driver's key file. */
 static bool hash_parts(const struct reference_job *job, void *ctx, struct err *e)
 {
     char(*hex)[65] = ctx, program[4096], all[64 * MOST_SCRIPTS + 1];

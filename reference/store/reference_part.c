@@ -19,7 +19,7 @@ static const struct engine_driver *need_driver(const struct suite_scene *scene,
     return d;
 }
 
-/* What the parts of one reference have in common and those of another have not. */
+/* Identifies the reference that a part belongs to. */
 static json_t *identity_of(const struct suite_scene *scene, const struct suite_reference *ref,
                            const struct reference_options *opt)
 {
@@ -65,7 +65,8 @@ struct range {
     json_t *said;
 };
 
-/* Reading them shows whether they are what was asked for, before anybody takes the job for done. */
+/* Reading the images back shows whether they are what was asked for, before the job counts as
+ * done. */
 static bool render_range(const struct reference_job *job, void *ctx, struct err *e)
 {
     const struct range *r = ctx;
@@ -111,7 +112,7 @@ bool reference_render_part(const struct suite_scene *scene, const struct suite_r
 struct gathered {
     const char **dir;
     int num;
-    json_t *said; /* of the first part: of all */
+    json_t *said; /* of the first part; all others have to equal it */
     double cpu_s, wall_s;
 };
 
@@ -121,7 +122,7 @@ static void path_of(const void *ctx, int k, char path[REPLICATE_IMAGE_PATH])
     replicate_images_path(g->dir[k], PREFIX, k, path);
 }
 
-/* The next part, whose images have to follow those that are there: *next. */
+/* Adds a part, whose images have to begin at number *next. */
 static bool add_part(struct gathered *g, const json_t *identity, const char *dir, int *next,
                      struct err *e)
 {

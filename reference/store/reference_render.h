@@ -17,51 +17,54 @@ NODISCARD bool reference_render(const struct suite_scene *scene, const struct su
                                 const struct reference_options *opt, struct moments *out,
                                 json_t **manifest, struct err *e);
 
-/* The same in parts, which may be made anywhere and in any order: ranges of the images that an engine's reference is folded
- * from (replicate_images.h). Not of "truth". */
+/* The same can be done in parts, anywhere and in any order: ranges of the images that an engine's reference is folded
+ * from (replicate_images.h): reference_count(), reference_render_part() and reference_fold_parts() below. Not for
+ * "truth". */
 
-/* Can the engine express the scene, its filter, too? Fails with the reason. Not of "truth" and "pathtracer". */
+/* Can the engine express the scene, including its pixel filter? If not, *why says why. Not for "truth" and
+ * "pathtracer". */
 NODISCARD bool reference_is_expressible(const struct suite_scene *scene,
                                         const struct suite_reference *ref,
                                         const struct reference_options *opt, struct err *why);
 
-/* Is it made by rendering, and stored? Not closed forms, which are computed, nor our own program, which renders each time. */
+/* Is the reference rendered and stored? Closed forms are computed, and our own program renders anew each time. */
 bool reference_is_rendered(const struct suite_reference *ref);
 
-/* How many images that are. */
+/* The number of images that the reference is folded from. */
 NODISCARD bool reference_count(const struct suite_scene *scene, const struct suite_reference *ref,
                                const struct reference_options *opt, int *num, struct err *e);
-/* Images first .. last-1 into dir, which exists: picture_NNNN.exr (float32, to the bit what the fold takes), each looked at,
- * and, in the end, part.json: "of" (scene, its hash, engine, settings, seed), "first", "last", "said" (what only the
- * engine knows: version, hash of its binary ...), "cpu_s", "wall_s". */
+/* Renders images first .. last-1 into dir, which exists: picture_NNNN.exr (float32, exactly what the fold takes), each
+ * checked, and, at the end, part.json: "of" (scene, its hash, engine, settings, seed), "first", "last", "said" (what
+ * only the engine knows: version, hash of its binary ...), "cpu_s", "wall_s". */
 NODISCARD bool reference_render_part(const struct suite_scene *scene,
                                      const struct suite_reference *ref,
                                      const struct reference_options *opt, int first, int last,
                                      const char *dir, struct err *e);
-/* What reference_render() returns: the same moments to the bit, the same manifest but for "date", "cpu_s" and "wall_s": this
- * function's and those of all parts added. dir: num directories of such parts, in the order of their images. Fails
- * also if these are not all images of this reference, each once, or not all made by the same version of the engine. */
+/* Returns what reference_render() would: bit-identical moments, and the same manifest except "date" and the times
+ * "cpu_s" and "wall_s", which are sums over this call and all parts. dir: num directories of parts, in the order of
+ * their images. Also fails unless these hold every image of this reference exactly once, all made by the same version
+ * of the engine. */
 NODISCARD bool reference_fold_parts(const struct suite_scene *scene,
                                     const struct suite_reference *ref,
                                     const struct reference_options *opt, const char *const *dir,
                                     int num, struct moments *out, json_t **manifest, struct err *e);
 
-/* golden/<scene>/<engine>.exr and golden/<scene>/manifest.json: an object with one member per engine,
- * what reference_render() said and exr_sha256; the others are kept. Both appear by rename: the
- * image beside its place (.exr.next), the manifest with its hash, the image in its place. So whenever a
- * writer is killed there is the old pair or the new one, which golden_read() finds. Engines may be
- * written at the same time. */
+/* Writes golden/<scene>/<engine>.exr and golden/<scene>/manifest.json: an object with one member per engine,
+ * reference_render()'s manifest and exr_sha256; other engines' members are kept. First the image is written beside
+ * its place (.exr.next), then the manifest with its hash is renamed, then the image. So whenever a writer is killed,
+ * golden_read() finds either the old pair or the new one. Several engines may be written at the same time. */
 NODISCARD bool golden_write(const char *golden_dir, const char *scene, const char *engine,
                             const struct moments *m, json_t *manifest, struct err *e);
-/* Ends what a killed golden_write() began: an image beside its place that the manifest describes takes it, another is removed. */
+/* Finishes what a killed golden_write() began: if the manifest describes the .exr.next, it is moved into place, else
+ * removed. */
 NODISCARD bool golden_settle(const char *golden_dir, const char *scene, const char *engine,
                              struct err *e);
-/* The entry first, then the image. True also where there is none. */
+/* Removes the entry, then the image. True also if there is neither. */
 NODISCARD bool golden_remove(const char *golden_dir, const char *scene, const char *engine,
                              struct err *e);
 /* Fails if there is none, if its scene hash differs from scene->sha256 (a stale golden), if the
  * EXR's hash differs from the manifest's, or if size, depth, spp, replicates are not those of the
- * suite. *manifest is a new reference. */
+ * suite. The caller frees *out and *manifest (a new reference). */
 NODISCARD bool golden_read(const char *golden_dir, const struct suite_scene *scene,
                            const struct suite_reference *ref, struct moments *out,
                            json_t **manifest, struct err *e);
@@ -74,15 +77,15 @@ enum golden_state {
 };
 struct golden {
     enum golden_state state;
-    struct moments m; /* of a current and of a stale one; else empty */
+    struct moments m; /* if current or stale; else empty */
     json_t *manifest; /* likewise; owned */
-    struct err why;   /* not current */
+    struct err why;   /* why it is not current */
 };
 /* The caller calls golden_free(). */
 void golden_inspect(const char *golden_dir, const struct suite_scene *scene,
                     const struct suite_reference *ref, struct golden *out);
 void golden_free(struct golden *g);
-/* False where golden_inspect() would say GOLDEN_MISSING; the image is not looked at. */
+/* False if golden_inspect() would say GOLDEN_MISSING; does not read the image. */
 bool golden_is_there(const char *golden_dir, const struct suite_scene *scene,
                      const struct suite_reference *ref);
 const char *golden_state_name(enum golden_state state);

@@ -1,5 +1,5 @@
-/* The engines that this program knows by name, in the order in which lists and pages have them: one table for everybody who
- * lists them. What writes their scene files and what runs them is bound to it in reference/external/engine_bindings.c. */
+/* The engines that this program knows by name, in the order of lists and pages: the only table of them. The code that
+ * writes their scene files and that runs them is bound to it in reference/external/engine_bindings.c. */
 #ifndef ASSAY_ENGINE_TABLE_H
 #define ASSAY_ENGINE_TABLE_H
 
@@ -16,7 +16,7 @@
     ROW(mitsuba, "Mitsuba", ".xml", "mitsuba", false)                                              \
     ROW(pbrt, "pbrt", ".pbrt", "pbrt", false)
 
-/* Rows for lists of words, {"auto", ENGINES(ENGINE_WORD) NULL}, and for sentences, "one of" ENGINES(ENGINE_TEXT). */
+/* For ROW: in lists of words, {"auto", ENGINES(ENGINE_WORD) NULL}, and in sentences, "one of" ENGINES(ENGINE_TEXT). */
 #define ENGINE_WORD(name, ...)                                #name,
 #define ENGINE_TEXT(name, ...)                                " " #name
 #define ENGINE_ID(name, ...)                                  ENGINE_##name,
@@ -28,13 +28,13 @@ struct engine_kind {
     const char *title;   /* for people */
     const char *ending;  /* of its scene files */
     const char *program; /* looked up in PATH */
-    bool subgrid; /* the suite says k, for k x k samples a pixel of one replicate, not "spp" */
+    bool subgrid; /* scenes state k ("subgrid"), for k x k samples per pixel of a replicate, not "spp" */
 };
 
 extern const struct engine_kind engine_table[]; /* ends with a NULL name */
 extern const char *const engine_names[];        /* of those with goldens; ends with NULL */
 
-/* NULL if there is none of that name; engine_with_goldens() also for an engine without. */
+/* NULL if there is no engine of that name; engine_with_goldens() also if it has no goldens. */
 const struct engine_kind *engine_kind_of(const char *name);
 const struct engine_kind *engine_with_goldens(const char *name);
 

@@ -4,7 +4,7 @@
 
 #include <math.h>
 
-/* Normals closer than this to the geometric one are the geometric one: text with six digits. */
+/* Shading normals this close to the geometric one count as equal to it: files have six digits. */
 #define FLAT 1e-5
 
 const char *const feature_names[NUM_FEATURES + 1] = {
@@ -76,13 +76,13 @@ bool features_are_smooth(const struct scene *s, uint32_t first, uint32_t num)
     return false;
 }
 
-/* Along one axis, from p to the interval of a, b, c. */
+/* Distance along one axis from p to the interval that a, b and c span. */
 static double gap(float p, float a, float b, float c)
 {
     return fmax(0, fmax((double)fminf(a, fminf(b, c)) - p, (double)p - fmaxf(a, fmaxf(b, c))));
 }
 
-/* No more than that of the nearest point. */
+/* A lower bound for the distance of the nearest point. */
 static double triangle_distance(const vec3 *p, vec3 eye)
 {
     double plane = fabs(d3_dot(features_normal(p), d3_sub(d3_of(eye), d3_of(p[0]))));
@@ -92,7 +92,7 @@ static double triangle_distance(const vec3 *p, vec3 eye)
     return fmax(plane, box);
 }
 
-/* Of one primitive: distances from the eye, depths along the view. */
+/* Of one primitive: smallest and largest distance from the eye and depth along the view. */
 struct reach {
     double distance[2], depth[2];
 };
@@ -118,7 +118,7 @@ static struct reach sphere_reach(const struct sphere *b, const struct camera *c)
     return (struct reach){{fabs(d - radius), d + radius}, {depth - radius, depth + radius}};
 }
 
-/* Triangles first. */
+/* Of primitive i; triangles come first. */
 static struct reach reach_of(const struct scene *s, uint32_t i, const struct camera *c)
 {
     return i < s->num_triangles ? triangle_reach(s->position + 3 * (size_t)i, c)
@@ -221,9 +221,9 @@ bool features_check_clipping(const char *engine, const struct scene *s, const st
                    engine, (double)c->near, (double)c->far, nearest, furthest);
 }
 
-/* What lies before the near plane, between, and beyond the far one. */
+/* Depths of what lies before the near plane, between the planes, and beyond the far one. */
 struct layers {
-    double before, seen[2], beyond; /* largest depth, smallest and largest, smallest */
+    double before, seen[2], beyond; /* largest; smallest and largest; smallest */
     bool is_mixed;
 };
 

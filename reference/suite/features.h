@@ -1,5 +1,5 @@
-/* What a scene asks of a renderer, as names that an engine's description lists (tools/docs/formats/engine.md). Triangles
- * and a pinhole camera with square pixels are asked of every engine and have no name. */
+/* What a scene requires of a renderer, by the names that an engine's description lists (tools/docs/formats/engine.md).
+ * Triangles and a pinhole camera with square pixels are required of every engine and have no name. */
 #ifndef ASSAY_FEATURES_H
 #define ASSAY_FEATURES_H
 
@@ -39,41 +39,41 @@ enum {
 extern const char *const feature_names[NUM_FEATURES + 1]; /* ends with NULL */
 extern const char *const feature_texts[NUM_FEATURES];     /* for people */
 
-/* Bit 1 << enum feature of all that image needs. */
+/* All features that the image needs, as bits 1 << enum feature. */
 unsigned features_of_scene(const struct scene *s, const struct camera *c);
 
 /* Does a shading normal of these triangles differ from the geometric one by more than the rounding of text? */
 bool features_are_smooth(const struct scene *s, uint32_t first, uint32_t num);
 
-/* Distances from the eye: no more than that of the nearest point of the scene (a triangle counts with
- * the larger of its plane's and its box's), and that of the furthest. */
+/* Distances from the eye: a lower bound for the nearest point of the scene (of a triangle, the larger of
+ * the distances to its plane and to its bounding box), and that of the furthest point. */
 void features_distances(const struct scene *s, const struct camera *c, double *nearest,
                         double *furthest);
 
 /* The unit geometric normal of three corners. */
 dvec3 features_normal(const vec3 *p);
 
-/* What a kind of material is called in the line of an engine that does not have it. */
+/* Names of the kinds of material, for the error lines of engines that lack them. */
 extern const char *const features_material_names[NUM_MATERIAL_KINDS];
 
-/* For the writers of scene files; each fails with `engine` in front. Where the near or far plane may cut geometry, and
- * where there is none: */
+/* For exporters; error lines begin with `engine`. This one fails if the near or far plane may cut geometry, or if there
+ * is no geometry. */
 NODISCARD bool features_check_clipping(const char *engine, const struct scene *s,
                                        const struct camera *c, struct err *e);
-/* Planes for engines that clip by depth; ours clip by distance. They exist if each primitive in front of the camera lies
- * wholly before the near plane, between, or beyond the far one, and depths separate the same primitives; 0 and INFINITY
- * where a plane cuts nothing. Else fails as features_check_clipping(). */
+/* Clipping planes for engines that clip by depth, whereas ours clip by distance. They exist if each primitive in front
+ * of the camera lies wholly before the near plane, between the planes, or beyond the far one, and depths separate the
+ * same primitives. 0 and INFINITY if a plane cuts nothing. Otherwise fails as features_check_clipping() does. */
 NODISCARD bool features_clip_depths(const char *engine, const struct scene *s,
                                     const struct camera *c, double *near, double *far,
                                     struct err *e);
-/* Where the camera's pixels are not square or its axes not orthogonal. */
+/* Fails if the camera's pixels are not square or its axes not orthogonal. */
 NODISCARD bool features_check_axes(const char *engine, const struct camera *c, struct err *e);
-/* Where a shading normal of a vertex is on the back of its triangle. */
+/* Fails if a vertex has a shading normal on the back of its triangle. */
 NODISCARD bool features_check_normals(const char *engine, const struct scene *s, struct err *e);
-/* Where a material has a texture. */
+/* Fails if a material has a texture. */
 NODISCARD bool features_check_textures(const char *engine, const struct scene *s, struct err *e);
-/* Axes, clipping, normals, textures; orthographic cameras, falloffs other than the inverse square, spot lights with an
- * exponent, the assignment's ambient light. */
+/* All of these (axes, clipping, normals, textures); fails also on orthographic cameras, falloffs other than the inverse
+ * square, spot lights with an exponent, and the assignment's ambient light. */
 NODISCARD bool features_check_exportable(const char *engine, const struct scene *s,
                                          const struct camera *c, struct err *e);
 

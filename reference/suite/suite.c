@@ -16,7 +16,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Where the name of a scene's file ends, in ".dae" or ".json"; NULL of other files. */
+/* The ending ".dae" or ".json" in the name of a scene's file; NULL for other files. */
 static const char *ending_of(const char *file)
 {
     const char *dot = strrchr(file, '.');
@@ -45,7 +45,7 @@ static bool is_scene_name(const char *s)
            end - s < (ptrdiff_t)sizeof((struct suite_scene *)NULL)->name;
 }
 
-/* Of each scene the .dae and the .json, which follow each other in the order of all names. */
+/* Checks that each scene has a .dae and a .json, which are neighbours in the sorted list. */
 static bool check_files(const char *dir, struct dirent **file, int num, struct err *e)
 {
     if (num == 0)
@@ -67,7 +67,7 @@ static bool check_files(const char *dir, struct dirent **file, int num, struct e
     return true;
 }
 
-/* Of the hashes of all files that a scene of one's own uses besides; "" if there are none. */
+/* A hash of the hashes of all files that a scene "uses"; "" if there are none. */
 static bool hash_uses(const char *dir, const struct suite_scene *s, char hex[65], struct err *e)
 {
     const json_t *uses = json_object_get(s->json, "uses");
@@ -118,7 +118,7 @@ static bool inherits(const struct suite *suite, const struct suite_scene *s)
     return suite->is_own ? strcmp(s->references_of, s->name) != 0 : s->name[0] == '9';
 }
 
-/* A 9x scene is held against another scene's references, at the same size. */
+/* A 9x scene is compared with another scene's references, at the same size. */
 static bool inherit(const struct suite *suite, const char *dir, struct suite_scene *s,
                     struct err *e)
 {

@@ -15,30 +15,30 @@
 enum verdict {
     VERDICT_EQUIVALENT, /* inside a margin that was declared; never without one */
     VERDICT_DIFFERENT,
-    VERDICT_NOTHING_FOUND, /* "NO DIFFERENCE FOUND": no margin was declared, and nothing is known but its MDB */
+    VERDICT_NOTHING_FOUND, /* "NO DIFFERENCE FOUND": no margin was declared; only the MDB is known */
     VERDICT_INCONCLUSIVE /* neither, or something that was asked for could not be tested */
 };
 
 struct suite_reference {
     char engine
-        [32]; /* of engine_table.h, with goldens, or "truth"; in a suite of one's own also "pathtracer", or the
-                             name of what is stored, of any engine */
+        [32]; /* one with goldens (engine_table.h) or "truth"; in a suite of one's own also "pathtracer" or any
+                             engine whose images are stored */
     char fidelity[16];    /* "class" in the file: "exact", "limit" (exact in the limit of its own
                              settings) or "approximate" */
     double margin_global; /* largest relative difference of the image mean that counts as equal */
     double margin_tile;   /* the same for one tile */
     int replicates; /* engines: images with a seed of their own; 0: as many as its description says */
     int spp;        /* samples per pixel of one replicate (0 likewise), or */
-    int subgrid;    /* (engine_kind.subgrid) one is a box-averaged (k W) x (k H) image */
+    int subgrid;    /* k, if engine_kind.subgrid: a replicate is a box-averaged (k W) x (k H) image */
     char kind[32];  /* truth: which closed form (truth.h) */
     json_t *values; /* truth: its numbers; borrowed from the suite */
 };
 
-/* Another way of ours to the same image: further options of pathtracer. */
+/* Another way for our renderer to compute the same image: further options of pathtracer. */
 struct suite_variant {
     char name[64]; /* "pathtracer-hemisphere" */
     int spp;
-    double margin_global, margin_tile; /* as of a reference: its noise is its own */
+    double margin_global, margin_tile; /* as for a reference; a variant has its own noise */
     const char *options[9];            /* NULL at the end; borrowed from the suite */
 };
 
@@ -46,14 +46,14 @@ enum { MAX_VARIANTS = 8, MAX_REFERENCES = 8 };
 
 struct suite_scene {
     char name[64];          /* "41_cornell" */
-    char dae[4096];         /* path of the .dae, in a suite of one's own of any file */
+    char dae[4096];         /* path of the .dae; in a suite of one's own, of a file of any kind */
     bool is_opaque;         /* not COLLADA: only an engine with the format "file" reads it */
     char environment[4096]; /* path of an .exr or .hdr; empty if there is none */
     double lens_radius, focal_distance; /* as of struct camera; 0 and 0: pinhole */
-    struct pixel_filter filter;         /* the box of one pixel, but where an engine has its own */
+    struct pixel_filter filter;         /* the box of one pixel unless an engine has its own */
     char sha256
         [65]; /* lower-case hex: of the .dae; with an environment, a lens or other files, of a text that
-                        holds that, the environment's, the lens and the files that it uses */
+                        holds that hash, the lens, and the hashes of the environment and of these files */
     char title[128], detects[512], blind_to[512];
     char convention[512]; /* where correct renderers may differ; empty: nowhere */
     int width, height;
@@ -63,14 +63,14 @@ struct suite_scene {
     enum verdict expect;
     struct suite_variant variant[MAX_VARIANTS];
     int num_variants;
-    /* Renders with seeds of their own that must err as much as they say (tools/stats/stated_error.h); 0
-     * renders: not asked. */
+    /* The check that renders with different seeds err as much as they state (tools/stats/stated_error.h);
+     * 0 renders: no check. */
     struct {
         int renders, spp;
         double margin;
-        double noise_margin; /* 0: not asked */
-        int parts;           /* samples of the first of two shares; 0: not asked */
-        int batch, most;     /* of one adaptive render; 0: not asked */
+        double noise_margin; /* 0: not checked */
+        int parts;           /* samples of the first of two shares; 0: not checked */
+        int batch, most;     /* of one adaptive render; 0: not checked */
         double tolerance;
     } consistency;
     json_t *not_expressible; /* borrowed: {engine: reason}, or NULL */
@@ -84,13 +84,14 @@ struct suite_scene {
 struct suite {
     struct suite_scene *scene; /* sorted by name */
     int num_scenes;
-    bool is_own; /* of a suite.json: suite_own.h */
+    bool is_own; /* loaded from a suite.json (suite_own.h) */
     char
-        engine[4096]; /* of that: path of the description of what is judged; empty: none is named */
+        engine[4096]; /* if is_own: path of the description of the engine to judge; empty: none */
 };
 
-/* Loads all scenes of a directory: those of its suite.json, else all that stand in it. A 9x scene inherits the `references` object of the scene it
- * names. Fails on an empty directory, a .dae without .json and the reverse. */
+/* Loads all scenes of a directory: those of its suite.json if it has one, else all in it. A 9x scene inherits the
+ * references of the scene that it names. Fails on an empty directory, and on a .dae without .json or vice versa. The
+ * caller calls suite_free(). */
 NODISCARD bool suite_load(const char *dir, struct suite *out, struct err *e);
 void suite_free(struct suite *s);
 /* Reads the scene with its environment, and its camera with its lens. The caller calls
@@ -100,7 +101,7 @@ NODISCARD bool suite_open(const struct suite_scene *s, struct scene *scene, stru
 /* NULL if there is none of that name. */
 const struct suite_scene *suite_find(const struct suite *s, const char *name);
 const struct suite_reference *suite_reference_of(const struct suite_scene *s, const char *engine);
-/* Closed forms for which truth_noise.h has the noise, too. */
+/* Is `kind` a closed form whose noise is known, too (truth_noise.h)? */
 bool suite_noise_is_known(const char *kind);
 
 const char *verdict_name(enum verdict v); /* "EQUIVALENT", ... */

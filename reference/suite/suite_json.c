@@ -47,7 +47,7 @@ bool suite_json_check_class(const struct json_node *n, const struct suite_refere
                    n->at, r->fidelity);
 }
 
-/* One replicate would have no variance. */
+/* At least two replicates: one has no variance. */
 bool suite_json_read_settings(const struct json_node *n, const struct engine_kind *kind,
                               struct suite_reference *r, struct err *e)
 {
@@ -118,7 +118,7 @@ static bool read_environment(const struct json_node *n, struct suite_scene *s, s
            err_set(e, "%s: path too long", name);
 }
 
-/* Files beside the .json, of which suite.c makes a part of the scene's hash. */
+/* Files beside the .json, which suite.c includes in the scene's hash. */
 static bool check_uses(const struct json_node *n, struct err *e)
 {
     const json_t *list = json_object_get(n->object, "uses");
@@ -219,7 +219,7 @@ static bool check_noise(const char *file, const struct suite_scene *s, struct er
            err_set(e, "%s: 'consistency.noise_margin' needs a truth whose noise is known", file);
 }
 
-/* An engine either has a reference or a reason, not both. */
+/* An engine has a reference or a reason why it has none, not both. */
 static bool read_not_expressible(const struct json_node *n, struct suite_scene *s, struct err *e)
 {
     if (!json_has(n, "not_expressible"))

@@ -5,17 +5,18 @@
 #include "reference/base/json_node.h"
 #include "suite.h"
 
-/* Everything that suite.h describes but what a 9x scene inherits. s->name is set and s->json is the
- * parsed file, which s->reference and s->not_expressible then borrow from. */
+/* Reads everything that suite.h describes except what a 9x scene inherits. The caller has set
+ * s->name and s->json, the parsed file, from which s->reference and s->not_expressible borrow. */
 NODISCARD bool suite_json_read(const char *file, struct suite_scene *s, struct err *e);
 
-/* Shared with suites of a user's own. Is the class that was read one? */
+/* These are shared with suite_own.c. Fails unless r->fidelity is a known class. */
 NODISCARD bool suite_json_check_class(const struct json_node *n, const struct suite_reference *r,
                                       struct err *e);
-/* How a reference is made: by an engine with goldens; kind is NULL: a closed form. */
+/* Reads how a reference is made: by an engine with goldens, or, if kind is NULL, as a closed
+ * form. */
 NODISCARD bool suite_json_read_settings(const struct json_node *n, const struct engine_kind *kind,
                                         struct suite_reference *r, struct err *e);
-/* Both members or none. */
+/* Reads "lens_radius" and "focal_distance": both or neither. */
 NODISCARD bool suite_json_read_lens(const struct json_node *n, struct suite_scene *s,
                                     struct err *e);
 

@@ -32,7 +32,7 @@ static bool check_name(const struct json_node *n, const char *what, const char *
                    n->file, n->at, name, what, size - 1);
 }
 
-/* A path beside suite.json, of a file that is there. */
+/* A path, relative to suite.json unless absolute, of a file that can be read. */
 static bool read_path(const struct json_node *n, const char *key, const char *dir, char *out,
                       size_t size, struct err *e)
 {
@@ -47,7 +47,7 @@ static bool read_path(const struct json_node *n, const char *key, const char *di
            err_set(e, "%s: '%s%s' is '%s', which cannot be read", n->file, n->at, key, out);
 }
 
-/* "margin" is of the image, and four times that of a tile; either can be given by itself. */
+/* "margin" is the image's, and the tile's is four times that (at most 0.99); either can be set by its own key. */
 static bool read_margins(const struct json_node *n, double *global, double *tile, struct err *e)
 {
     if (json_has(n, "margin")) {
@@ -59,7 +59,7 @@ static bool read_margins(const struct json_node *n, double *global, double *tile
            json_may_number(n, "margin_tile", 0, 1, tile, e);
 }
 
-/* Margins: those of the scene so far. */
+/* r's margins are preset to the scene's. */
 static bool read_reference(const struct json_node *n, const char *name, struct suite_scene *s,
                            struct suite_reference *r, struct err *e)
 {
@@ -96,7 +96,8 @@ static bool read_reference(const struct json_node *n, const char *name, struct s
     return suite_json_read_settings(n, kind, r, e);
 }
 
-/* Those of the suite and of the scene in one object: of what both name, the scene's members count. null: not of this scene. */
+/* The suite's and the scene's references in one object; where both have a member, the scene's counts. null removes
+ * one. */
 static json_t *merge_references(const json_t *of_suite, const json_t *of_scene)
 {
     json_t *all = of_suite != NULL ? json_deep_copy(of_suite) : json_object(), *value;
@@ -164,7 +165,7 @@ static bool read_expected(const struct json_node *n, struct suite_scene *s, stru
                    expect);
 }
 
-/* s->name and s->json are set; margins: the suite's. */
+/* s->name and s->json are set; global and tile are the suite's margins. */
 static bool read_scene(const struct json_node *n, const char *dir, double global, double tile,
                        struct suite_scene *s, struct err *e)
 {

@@ -8,8 +8,9 @@
 #include <gsl/gsl_math.h>
 #include <string.h>
 
-/* The albedo, a smooth function of the cosine, is computed at CHEBYSHEV + 1 cosines by POINTS x POINTS
- * points, and checked between them by more. (GSL has these two rules as tables, in full precision.) */
+/* The albedo, a smooth function of the cosine, is computed at CHEBYSHEV + 1 cosines with POINTS x POINTS
+ * points each, interpolated, and checked in between with CHECK_POINTS. (GSL has these two rules as tables, in
+ * full precision.) */
 enum { POINTS = 96, CHECK_POINTS = 128, CHEBYSHEV = 60, CHECKS = 7 };
 static const double max_albedo_error = 1e-10;
 

@@ -24,7 +24,7 @@ struct lamp {
     struct truth_spot spot;
 };
 
-/* A Lambertian plane y = 0 under them. */
+/* The Lambertian plane y = 0 and the lamps above it. */
 struct plane {
     double albedo[3], foot_x[2], foot_z[2];
     struct lamp lamp[MAX_LAMPS];
@@ -106,15 +106,17 @@ static bool plane_render(const struct plane *p, struct moments *out, struct err 
     bool ok = (rule != NULL && check != NULL) || err_set(e, "out of memory for a quadrature rule");
     double dx = (p->foot_x[1] - p->foot_x[0]) / out->width;
     double dz = (p->foot_z[1] - p->foot_z[0]) / out->height;
-    for (int i = 0; ok && i < out->width * out->height * p->num; i++) {
-        const struct lamp *l = &p->lamp[i % p->num];
-        int pixel = i / p->num, col = pixel % out->width, row = pixel / out->width;
+    const size_t width = (size_t)out->width, num = (size_t)p->num;
+    for (size_t i = 0; ok && i < width * (size_t)out->height * num; i++) {
+        const struct lamp *l = &p->lamp[i % num];
+        size_t pixel = i / num;
+        int col = (int)(pixel % width), row = (int)(pixel / width);
         double x = p->foot_x[0] + dx * col, z = p->foot_z[0] + dz * row, mean;
         ok = mean_irradiance(l, rule, check, (double[2]){x, x + dx}, (double[2]){z, z + dz}, &mean,
                              e) ||
              err_prefix(e, "pixel (%d,%d)", col, row);
         for (int c = 0; ok && c < 3; c++)
-            out->mean[3 * pixel + c] += p->albedo[c] / M_PI * l->strength[c] * mean;
+            out->mean[3 * pixel + (size_t)c] += p->albedo[c] / M_PI * l->strength[c] * mean;
     }
     gsl_integration_glfixed_table_free(rule);
     gsl_integration_glfixed_table_free(check);
@@ -185,7 +187,7 @@ static bool read_sphere(const json_t *values, struct plane *p, struct lamp *l, s
             err_set(e, "radius is %g, not below the height %g", l->radius, l->light[1]));
 }
 
-/* One of several. */
+/* Reads one entry of "lamps". */
 static bool read_lamp(const json_t *values, struct lamp *l, struct err *e)
 {
     l->source = json_object_get(values, "intensity") != NULL ? SOURCE_POINT : SOURCE_RECTANGLE;

@@ -55,8 +55,8 @@ static bool read_panel(const json_t *value, const struct suite_scene *s, struct 
     return true;
 }
 
-/* Share of rays of the pixel whose lower corner in x and y, at distance 1, is (x, y). A ray from the
- * lens point r l through the image's point s meets the panel's plane at distance D in
+/* Share of a pixel's rays that hit the panel; (x, y) is the pixel's lower corner at distance 1. A ray from
+ * the lens point r l through the image point s meets the panel's plane, at distance D, in
  * D s + r (1 - D/F) l. */
 static double panel_share(const struct panel *p, const struct suite_scene *s, double x, double y,
                           double dx, double dy)

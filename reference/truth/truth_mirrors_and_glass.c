@@ -19,9 +19,9 @@ double truth_fresnel(double cos_i, double n, double *cos_t)
     return 0.5 * (s * s + p * p);
 }
 
-/* Of a slab or any other body in which every internal reflection is like the first: weights of
- * light that comes out after j = 0, 1, .. internal reflections, j + 2 bounces. F: reflectance on entry.
- * (1 - F)^2 F^j, or 0 if that is more than `depth` bounces. */
+/* Weight of the light that leaves a slab, or any body in which every internal reflection is like the first,
+ * after j internal reflections (j + 2 bounces): (1 - f)^2 f^j, f being the reflectance on entry, or 0 if that is
+ * more than `depth` bounces. */
 static double glass_weight(double f, int j, int depth)
 {
     return j + 2 <= depth ? (1 - f) * (1 - f) * gsl_pow_int(f, j) : 0;
@@ -52,7 +52,7 @@ void truth_mirror_box_radiance(const struct truth_mirror_box *b, int depth, doub
 {
     double length = b->z[1] - b->z[0];
     light[0] = light[1] = light[2] = 0;
-    /* The n-th arrival at the end, after as many reflections there and at the back. */
+    /* Arrival at the end after n reflections there and n at the back. */
     for (int n = 0; 2 * n <= depth; n++) {
         double way = b->eye[2] - b->z[0] + 2 * n * length;
         int met[6] = {[4] = n, [5] = n}, bounces = 0;
@@ -165,7 +165,7 @@ static bool fill_mirror_box(const struct suite_scene *scene, const struct suite_
 /* The slab, and the window, which is its surface seen from inside. */
 
 struct pane {
-    double n, front[3], behind[3]; /* of a window what is below and above it */
+    double n, front[3], behind[3]; /* radiance; of a window: below and above it */
     int depth;
     bool is_window;
 };
@@ -259,12 +259,12 @@ int truth_glass_sphere_radiance(const void *sphere, const double eye[3], const d
     if (!truth_sphere_hit(eye, d, s->centre, s->radius, &cos_i, normal))
         return add_wall(s, eye, d, 1, light);
     double sin_i = sqrt(1 - cos_i * cos_i), f = truth_fresnel(cos_i, s->n, NULL);
-    /* In the plane of incidence, square to the normal at the point of entry: where the ray goes. */
+    /* Unit vector in the plane of incidence, perpendicular to the normal at entry, in the ray's direction. */
     for (int k = 0; k < 3; k++)
         along[k] = sin_i > 0 ? (d[k] + cos_i * normal[k]) / sin_i : 0;
     /* The ray leaves after j internal reflections at the polar angle (j + 1)(pi - 2 theta_t) from the
-     * point of entry, counted towards `along`, and there under theta_i to the normal, on the side it
-     * turns to. j = -1 is the reflection at the point of entry. */
+     * point of entry, counted towards `along`, and there at the angle theta_i to the normal, on the
+     * side it is turning to. j = -1 is the reflection at the point of entry. */
     double sin_t = sin_i / s->n, cos_t = sqrt(1 - sin_t * sin_t);
     double turn[2] = {2 * sin_t * sin_t - 1, 2 * sin_t * cos_t}; /* cosine and sine */
     double polar[2] = {1, 0};
@@ -304,7 +304,7 @@ static bool sphere_values(const json_t *values, struct truth_glass_sphere *s, st
 static bool fill_sphere(const struct suite_scene *scene, const struct suite_reference *ref,
                         struct moments *out, struct err *e)
 {
-    /* The number that tells the pieces apart has a digit to the base 6 for each way. */
+    /* The number that tells the pieces apart has one base-6 digit for each path. */
     enum { MAX_DEPTH = 10 };
     struct truth_glass_sphere s = {.depth = scene->depth};
     struct truth_view view;

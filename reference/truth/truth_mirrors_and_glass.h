@@ -41,7 +41,7 @@ struct truth_mirror_box {
 void truth_mirror_box_radiance(const struct truth_mirror_box *b, int depth, double sx, double sy,
                                double light[3]);
 
-/* Light from in front of the slab and from behind it, as shares of the radiance seen under cos_i. */
+/* Weights of the radiances in front of and behind the slab in what is seen under cos_i, by at most `depth` bounces. */
 void truth_slab_shares(double cos_i, double n, int depth, double *front, double *behind);
 
 /* Shares of floor and sky in the radiance inside that is seen under the angle with that cosine from the
@@ -55,8 +55,8 @@ struct truth_glass_sphere {
     int depth;
 };
 
-/* Radiance that arrives at `eye` from the unit direction d. Returns which walls it comes from and by
- * which ways, as a number: truth_shade of truth_pixel_mean.h, with a struct truth_glass_sphere. */
+/* Radiance that arrives at `eye` from the unit direction d. Returns a number that tells which walls it comes
+ * from along which paths: a truth_shade (truth_pixel_mean.h) whose form is a struct truth_glass_sphere. */
 int truth_glass_sphere_radiance(const void *sphere, const double eye[3], const double d[3],
                                 double light[3]);
 

@@ -9,7 +9,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { MOST = 48 }; /* of a rule's places along a side */
+enum { MOST = 48 }; /* points of a rule along a side */
 static const double max_quadrature_error = 1e-3;
 
 /* With p_l = d^2/(A cos_l) and p_b = cos_p/pi the two densities of a direction to the rectangle, and
@@ -32,7 +32,7 @@ ISA_CLONES static void moments_by_rule(const struct truth_lamp *l,
         gsl_integration_glfixed_point(l->ex[0], l->ex[1], i, &qx, &wx, rule);
         for (size_t j = 0; j < rule->n; j++) {
             double d2 = (qx - x) * (qx - x) + l->height * l->height + (z_of[j] - z) * (z_of[j] - z);
-            double cosine = l->height / sqrt(d2); /* on both sides */
+            double cosine = l->height / sqrt(d2); /* at the plane and at the lamp */
             p_l[j] = d2 / (area * cosine);
             p_b[j] = cosine / M_PI;
             w_l[j] = p_l[j] * p_l[j] / (p_l[j] * p_l[j] + p_b[j] * p_b[j]);
@@ -61,15 +61,15 @@ void truth_sample_moments(const struct truth_lamp *lamp, double x, double z, int
     gsl_integration_glfixed_table_free(rule);
 }
 
-/* What both rules are applied to. */
-struct image_file {
+/* The lamp and the part of the plane that the image shows. */
+struct footprint {
     struct truth_lamp lamp;
     double foot_x[2], foot_z[2];
     int width, height;
 };
 
-/* Variance of a sample of each pixel, albedo and radiance 1. */
-static bool by_orders(const struct image_file *p, size_t in_pixel, size_t in_lamp, double *variance)
+/* Variance of one sample of each pixel, for albedo and radiance 1. False if out of memory. */
+static bool by_orders(const struct footprint *p, size_t in_pixel, size_t in_lamp, double *variance)
 {
     gsl_integration_glfixed_table *place = gsl_integration_glfixed_table_alloc(in_pixel);
     gsl_integration_glfixed_table *rule = gsl_integration_glfixed_table_alloc(in_lamp);
@@ -98,7 +98,7 @@ bool truth_noise(const struct suite_scene *scene, const struct suite_reference *
                  double **variance, struct err *e)
 {
     double radiance[3], albedo[3];
-    struct image_file p = {.width = scene->width, .height = scene->height};
+    struct footprint p = {.width = scene->width, .height = scene->height};
     if (!suite_noise_is_known(ref->kind))
         return err_set(e, "%s: the noise of '%s' has no closed form", scene->name, ref->kind);
     if (!truth_values_read(

@@ -1,10 +1,9 @@
-/* How noisy one sample of our renderer is, where that has a closed form: so that samples which are
- * wasted, and estimators that are right but not the ones they are said to be, can be told from good
- * ones. All leave the mean right, and the error that they state too.
+/* The variance of one sample of our renderer, where it has a closed form: it exposes wasted samples and
+ * unbiased estimators other than the documented one, which leave the mean right and the stated error, too.
  *
  * kind of truth          estimator
- * rectangle_over_plane   a place in the pixel by the box filter, one light sample uniform in the
- *                        rectangle's area, one BSDF sample by the cosine; weighted by the power
+ * rectangle_over_plane   a point in the pixel by the box filter, one light sample uniform over the
+ *                        rectangle's area, one cosine-weighted BSDF sample; combined by the power
  *                        heuristic (beta = 2) [Veach97 9.2.3] */
 #ifndef ASSAY_TRUTH_NOISE_H
 #define ASSAY_TRUTH_NOISE_H
@@ -16,8 +15,8 @@ struct truth_lamp {
 };
 
 /* First and second moment of one sample at the point (x, 0, z) of a plane of albedo 1 under that
- * rectangle of radiance 1: in units of radiance and its square. `order` points of Gauss and Legendre
- * (even, 2..64) along each side of the rectangle. */
+ * rectangle of radiance 1: in units of radiance and its square. `order` Gauss-Legendre points (2..48)
+ * along each side of the rectangle. NAN if out of memory. */
 void truth_sample_moments(const struct truth_lamp *lamp, double x, double z, int order,
                           double moment[2]);
 

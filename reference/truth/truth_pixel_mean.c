@@ -63,7 +63,7 @@ bool truth_view_filled(const struct truth_view *view, const double centre[3], do
     if (!(radius > 0))
         return err_set(e, "radius is %g, not above 0", radius);
     *min_cos = 1;
-    /* Directions that meet it form a cone about its middle; of a square, a corner is furthest off. */
+    /* Directions that hit the sphere form a cone about its centre; of a square image, a corner is furthest from it. */
     for (int k = 0; k < 4; k++) {
         double d[3], cos_i, normal[3];
         truth_view_direction(view, k % 2 ? view->edge : -view->edge,
@@ -75,26 +75,26 @@ bool truth_view_filled(const struct truth_view *view, const double centre[3], do
     return true;
 }
 
-struct image_file {
+struct pixel_integral {
     const struct truth_view *view;
     truth_shade *shade;
     const void *form;
     gsl_integration_glfixed_table *rule, *check;
     double v;         /* of the scan line */
-    double width;     /* of a pixel in u and v, with a filter of a quarter of what it counts */
-    double centre[2]; /* of the pixel; with a filter alone */
+    double width;     /* of a pixel in u and v; with a filter, of a quarter of its support */
+    double centre[2]; /* of the pixel; only with a filter */
     double scale;     /* of the pixel's value, for the tolerance */
     bool converged;
 };
 
-static int look(const struct image_file *p, double u, double v, double light[3])
+static int look(const struct pixel_integral *p, double u, double v, double light[3])
 {
     double d[3];
     truth_view_direction(p->view, u, v, d);
     int id = p->shade(p->form, p->view->eye, d, light);
     if (p->view->filter->radius == 0)
         return id;
-    /* So that its mean over the quarter is that quarter's part of the pixel. */
+    /* Scaled so that the mean over a quarter is that quarter's contribution to the pixel. */
     double r = p->view->filter->radius;
     double weight = pixel_filter_value(p->view->filter, (u - p->centre[0]) * r / p->width) *
                     pixel_filter_value(p->view->filter, (v - p->centre[1]) * r / p->width) * r * r;
@@ -103,8 +103,8 @@ static int look(const struct image_file *p, double u, double v, double light[3])
     return id;
 }
 
-/* The piece that the whole pixel's border lies in and its middle, or false. */
-static bool is_one_piece(const struct image_file *p, double u, double v)
+/* Do the pixel's whole border and its centre lie in one piece? */
+static bool is_one_piece(const struct pixel_integral *p, double u, double v)
 {
     double light[3], w = p->width;
     int id = look(p, u + w / 2, v + w / 2, light);
@@ -117,7 +117,7 @@ static bool is_one_piece(const struct image_file *p, double u, double v)
     return true;
 }
 
-static void product_rule(const struct image_file *p, const gsl_integration_glfixed_table *rule,
+static void product_rule(const struct pixel_integral *p, const gsl_integration_glfixed_table *rule,
                          double u0, double v0, double mean[3])
 {
     for (int c = 0; c < 3; c++)
@@ -133,9 +133,9 @@ static void product_rule(const struct image_file *p, const gsl_integration_glfix
         }
 }
 
-typedef void line_function(struct image_file *p, double t, double light[3]);
+typedef void line_function(struct pixel_integral *p, double t, double light[3]);
 
-static void rule_on(struct image_file *p, line_function *f, double a, double b, double sum[3])
+static void rule_on(struct pixel_integral *p, line_function *f, double a, double b, double sum[3])
 {
     sum[0] = sum[1] = sum[2] = 0;
     for (size_t i = 0; i < p->rule->n; i++) {
@@ -148,9 +148,9 @@ static void rule_on(struct image_file *p, line_function *f, double a, double b, 
 }
 
 /* Adds the integral of f over [a,b], of which `whole` is the rule's estimate, to sum. The tolerance
- * is absolute and shared out by length, but for parts that hold a jump, which no halving smooths: they
- * may be off by `most`. */
-static void refine(struct image_file *p, line_function *f, double a, double b,
+ * is absolute and divided among parts by length; a part with a jump, which no halving removes, may be off
+ * by `most`. */
+static void refine(struct pixel_integral *p, line_function *f, double a, double b,
                    const double whole[3], double tolerance, double most, int halvings,
                    double sum[3])
 {
@@ -170,7 +170,7 @@ static void refine(struct image_file *p, line_function *f, double a, double b,
     }
 }
 
-static void integrate(struct image_file *p, line_function *f, double a, double b, double tolerance,
+static void integrate(struct pixel_integral *p, line_function *f, double a, double b, double tolerance,
                       double sum[3])
 {
     double whole[3];
@@ -178,13 +178,13 @@ static void integrate(struct image_file *p, line_function *f, double a, double b
     refine(p, f, a, b, whole, tolerance, 0.01 * tolerance, 0, sum);
 }
 
-static void at_point(struct image_file *p, double u, double light[3])
+static void at_point(struct pixel_integral *p, double u, double light[3])
 {
     look(p, u, p->v, light);
 }
 
 /* Integral along the scan line at v from a to b, piece by piece. */
-static void along_line(struct image_file *p, double a, double b, double sum[3])
+static void along_line(struct pixel_integral *p, double a, double b, double sum[3])
 {
     double tolerance = 0.1 * edge_tolerance * p->scale * (b - a), start = a, light[3];
     int id = look(p, a, p->v, light);
@@ -210,18 +210,18 @@ static void along_line(struct image_file *p, double a, double b, double sum[3])
 }
 
 struct column {
-    struct image_file p; /* first, so that a line_function finds it */
+    struct pixel_integral p; /* first, so that at_line() can cast a pointer to it */
     double u;
 };
 
-static void at_line(struct image_file *p, double v, double light[3])
+static void at_line(struct pixel_integral *p, double v, double light[3])
 {
     struct column *c = (struct column *)p;
     p->v = v;
     along_line(p, c->u, c->u + p->width, light);
 }
 
-static bool edge_pixel(struct image_file *p, double u, double v, double mean[3], struct err *e)
+static bool edge_pixel(struct pixel_integral *p, double u, double v, double mean[3], struct err *e)
 {
     struct column c = {.p = *p, .u = u};
     double area = p->width * p->width, sum[3] = {0};
@@ -236,7 +236,7 @@ static bool edge_pixel(struct image_file *p, double u, double v, double mean[3],
     return c.p.converged || err_set(e, "quadrature not converged at an edge");
 }
 
-static bool smooth_pixel(const struct image_file *p, double u, double v, double mean[3])
+static bool smooth_pixel(const struct pixel_integral *p, double u, double v, double mean[3])
 {
     double coarse[3];
     product_rule(p, p->rule, u, v, coarse);
@@ -247,12 +247,12 @@ static bool smooth_pixel(const struct image_file *p, double u, double v, double 
     return same;
 }
 
-static bool part_of_pixel(struct image_file *p, double u, double v, double mean[3], struct err *e)
+static bool part_of_pixel(struct pixel_integral *p, double u, double v, double mean[3], struct err *e)
 {
     return (is_one_piece(p, u, v) && smooth_pixel(p, u, v, mean)) || edge_pixel(p, u, v, mean, e);
 }
 
-static bool filtered_pixel(struct image_file *p, double u, double v, double mean[3], struct err *e)
+static bool filtered_pixel(struct pixel_integral *p, double u, double v, double mean[3], struct err *e)
 {
     p->centre[0] = u;
     p->centre[1] = v;
@@ -272,7 +272,7 @@ bool truth_view_render(const struct truth_view *view, truth_shade *shade, const 
 {
     if (out->width != out->height)
         return err_set(e, "the image is %d x %d, not square", out->width, out->height);
-    struct image_file p = {.view = view,
+    struct pixel_integral p = {.view = view,
                            .shade = shade,
                            .form = form,
                            .rule = gsl_integration_glfixed_table_alloc(ORDER),

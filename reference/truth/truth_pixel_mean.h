@@ -1,5 +1,5 @@
-/* What a pinhole camera sees, as an image: the mean of a closed form over each pixel's square, or weighed by a filter. No code
- * is shared with the renderer's camera: the frame stands as numbers in the .json. */
+/* Renders what a pinhole camera sees: the mean of a closed form over each pixel's square, or weighted by a pixel
+ * filter. No code is shared with the renderer's camera: the camera's frame is given as numbers in the .json. */
 #ifndef ASSAY_TRUTH_PIXEL_MEAN_H
 #define ASSAY_TRUTH_PIXEL_MEAN_H
 
@@ -14,7 +14,7 @@
 struct truth_view {
     double eye[3], right[3], up[3], forward[3], tan_half;
     const struct pixel_filter *filter; /* borrowed */
-    double edge; /* largest |u| and |v| that some pixel counts: 1, with a filter more */
+    double edge; /* largest |u| and |v| that contribute to any pixel: 1, with a filter more */
 };
 
 /* The "view" of the values, {"eye": [x,y,z], "right": [..], "up": [..], "forward": [..], "tan_half": t}: these keys, no others;
@@ -30,19 +30,19 @@ void truth_view_direction(const struct truth_view *view, double u, double v, dou
 bool truth_sphere_hit(const double o[3], const double d[3], const double centre[3], double radius,
                       double *cos_i, double normal[3]);
 
-/* The smallest cosine of incidence on a sphere that fills all that the image counts. Fails if it does not. */
+/* The smallest cosine of incidence on a sphere that fills the image, filter margin included. Fails if it does not. */
 NODISCARD bool truth_view_filled(const struct truth_view *view, const double centre[3],
                                  double radius, double *min_cos, struct err *e);
 
-/* Radiance that arrives at the eye from the unit direction d. The result tells the smooth pieces of the
- * image apart: within one of them light is smooth in the direction, up to a square root at the edge. */
+/* Radiance that arrives at the eye from the unit direction d. The returned number tells the smooth
+ * pieces of the image apart: within one, light is a smooth function of d, up to a square root at its edge. */
 typedef int truth_shade(const void *form, const double eye[3], const double d[3], double light[3]);
 
-/* Means over the pixels of a square image. A pixel of one piece: Gauss-Legendre rules with 8 x 8 and
- * 16 x 16 points that agree to 1e-10 of the value. Any other: scan lines, cut where the piece changes
- * (found by bisection), each part and the lines themselves bisected until Gauss-Legendre rules agree to
- * 1e-6 of the value. With a filter each quarter around the pixel's centre by itself, as a filter has a kink there.
- * Fails where they never do, and on images that are not square. */
+/* Means over the pixels of a square image. A pixel within one piece: Gauss-Legendre rules with 8 x 8 and
+ * 16 x 16 points, which must agree to 1e-10 of the value. Any other: scan lines, cut where the piece changes
+ * (found by bisection); each part, and the lines themselves, are bisected until Gauss-Legendre rules agree to
+ * 1e-6 of the value. With a filter, each quarter around the pixel's centre is integrated by itself, as a filter
+ * has a kink there. Fails if the rules do not agree, and on images that are not square. */
 NODISCARD bool truth_view_render(const struct truth_view *view, truth_shade *shade,
                                  const void *form, struct moments *out, struct err *e);
 

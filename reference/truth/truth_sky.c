@@ -72,7 +72,7 @@ double truth_gradient_reflected(const struct truth_gradient *g, int channel, con
     return g->mean[channel] + 2.0 / 3 * slope;
 }
 
-/* By how much linear interpolation between samples `step` apart lessens the wave cos(t): the Fourier
+/* The factor by which linear interpolation between samples `step` apart attenuates cos(t): the Fourier
  * transform of the tent, sinc^2(step/2). */
 static double flattening(double step)
 {

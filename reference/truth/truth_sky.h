@@ -31,12 +31,12 @@ struct truth_gradient {
 double truth_gradient_reflected(const struct truth_gradient *g, int channel, const double n[3]);
 
 /* Value of texel (col, row) of a latitude-longitude map of width x height texels (conventions of
- * renderer/scene/environment.h) that stands for that sky: bilinear interpolation between the middles of
- * texels flattens a wave by a known factor, by which the texels are steeper. */
+ * renderer/scene/environment.h) that stands for that sky: bilinear interpolation between texel centres
+ * attenuates a sinusoid by a known factor, by which the texels are amplified. */
 double truth_gradient_texel(const struct truth_gradient *g, int channel, int width, int height,
                             int col, int row);
 
-/* "mean" and "gradient" of such values; other keys are not looked at. */
+/* Reads "mean" and "gradient" of a sky_gradient; skips its other keys and fails on any others. */
 NODISCARD bool truth_gradient_read(const json_t *values, struct truth_gradient *g, struct err *e);
 
 #endif

@@ -10,7 +10,7 @@ enum { X = 0, Z = 2 };
 /* Points per axis of the two rules whose difference is the error estimate, and how many strips may
  * be halved because of it. */
 enum { ORDER = 8, CHECK_ORDER = 2 * ORDER, BUDGET = 2000 };
-/* Of one strip, relative to the whole: a hundred of them make 1e-10. */
+/* Error of one strip relative to the whole: a hundred strips make 1e-10. */
 static const double strip_tolerance = 1e-12;
 
 double truth_spot_irradiance(const struct truth_spot *s, double x, double z)
@@ -105,8 +105,8 @@ static double refine(struct patch *p, double z0, double z1)
     return refine(p, z0, middle) + refine(p, middle, z1);
 }
 
-/* Cuts where the integrand's limits change their form, so that a strip is lit somewhere at every z
- * or nowhere: sorted, without those outside. Returns how many. */
+/* The z at which the limits of integration change their form, so that a strip between two of them
+ * is lit at every z or at none; sorted, from z[0] to z[1]. Returns how many. */
 static int find_cuts(const struct truth_spot *s, const double x[2], const double z[2],
                      double cut[8])
 {

@@ -4,7 +4,7 @@
 
 #include <math.h>
 
-/* Up the normal of the facet between the ridges k and k+1. */
+/* The upward normal, not of unit length, of the facet between the ridges k and k+1. */
 static void facet_normal(const struct truth_pyramid *p, int k, double n[3])
 {
     double u[3], v[3];

@@ -9,7 +9,7 @@
 
 enum { MAX_TEXELS = 64 };
 
-/* Images of the texture to both sides of the first, at most. */
+/* Repetitions of the texture that are considered on either side of the first. */
 #define REACH 8
 
 enum wrap { WRAP, MIRROR, CLAMP, BORDER, NUM_WRAPS };
@@ -34,7 +34,7 @@ double truth_texel_share(double t, bool nearest)
     return s < 0 ? 0.5 * (1 + s) * (1 + s) : 1 - 0.5 * (1 - s) * (1 - s);
 }
 
-/* Which of n texels stands at place k of the endless row; -1: none. */
+/* Which of n texels is at position k of the infinitely repeated row; -1: none. */
 static int texel_at(int k, int n, enum wrap wrap)
 {
     int period = wrap == MIRROR ? 2 * n : n, m = ((k % period) + period) % period;
@@ -46,8 +46,8 @@ static int texel_at(int k, int n, enum wrap wrap)
     return m < n ? m : period - 1 - m;
 }
 
-/* Weights of the n texels in the mean of the texture over the coordinates a .. b of one axis (in
- * images), times `part`, the fraction of the pixel that this interval covers. */
+/* Weights of the n texels in the mean of the texture over the texture coordinates a .. b of one
+ * axis, times `part`, the fraction of the pixel that this interval covers. */
 static void axis_shares(double a, double b, int n, enum wrap wrap, bool nearest, double part,
                         double *share)
 {

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* A member of `values`, or of an object in it; `name` ends with any sign that is no part of a name. */
+/* A member of `values`, or of an object in it; `name` ends at a character that cannot be part of a name. */
 static const json_t *find(const json_t *values, const char *name)
 {
     size_t n = strcspn(name, ".[>=) ");
@@ -14,7 +14,8 @@ static const json_t *find(const json_t *values, const char *name)
     return name[n] == '.' ? find(v, name + n + 1) : v;
 }
 
-/* The numbers of v, one after the other; how many there are, -1 where something is none or there are more than num. */
+/* Copies the numbers of v, nested arrays included; returns how many, or -1 if something else is among them or there are
+ * more than num. */
 static int flatten(const json_t *v, double *to, int num)
 {
     int all = 0;
@@ -29,7 +30,7 @@ static int flatten(const json_t *v, double *to, int num)
     return json_is_array(v) ? all : -1;
 }
 
-/* The next word fills `to`. */
+/* Reads the member that `word` names into `to`. */
 static bool read_word(const json_t *values, const char *word, double *to, struct err *e)
 {
     const int length = (int)strcspn(word, "[>= ");
@@ -57,7 +58,7 @@ static bool read_word(const json_t *values, const char *word, double *to, struct
     return true;
 }
 
-/* Fails on a member of an object, of which `at` is the name with a dot, that no word names. */
+/* Fails on a member that no word names; `at`: the object's own name with a dot, "" for the outermost. */
 static bool only_known(const json_t *object, const char *at, const char *names, struct err *e)
 {
     const char *key;

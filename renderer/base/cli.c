@@ -259,7 +259,7 @@ bool cli_uint64(const char *what, const char *text, uint64_t *out, struct err *e
 {
     char *end;
     errno = 0;
-    unsigned long long v = strtoull(text, &end, 0);
+    unsigned long long v = strtoull(text, &end, strncmp(text, "0x", 2) == 0 ? 16 : 10);
     if (end == text || *end != '\0' || errno != 0 || strchr(text, '-') != NULL)
         return err_set(e, "%s: '%s' is not a whole number from 0 to 2^64-1", what, text);
     *out = v;

@@ -185,17 +185,19 @@ bool fs_remove_tree(const char *path, struct err *e)
 bool fs_copy(const char *from, const char *to, struct err *e)
 {
     char buffer[1 << 16];
-    FILE *in = fopen(from, "rb"), *out = in != NULL ? fopen(to, "wb") : NULL;
+    FILE *in = fs_open(from), *out = in != NULL ? fopen(to, "wb") : NULL;
     bool ok = in != NULL && out != NULL;
     for (size_t n; ok && (n = fread(buffer, 1, sizeof buffer, in)) > 0;)
         ok = fwrite(buffer, 1, n, out) == n;
     ok = ok && ferror(in) == 0;
+    ok = out != NULL && fclose(out) == 0 && ok && chmod(to, 0644) == 0;
+    if (!ok)
+        err_set(e, "cannot copy %s to %s: %s", from, to, strerror(errno));
+    if (!ok && out != NULL)
+        remove(to);
     if (in != NULL)
         fclose(in);
-    if (out != NULL && fclose(out) != 0)
-        ok = false;
-    return (ok && chmod(to, 0644) == 0) ||
-           err_set(e, "cannot copy %s to %s: %s", from, to, strerror(errno));
+    return ok;
 }
 
 const char *fs_base(const char *path)

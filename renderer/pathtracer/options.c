@@ -274,7 +274,7 @@ static bool complete(struct options *s, struct err *e)
     if ((s->adaptive_batch > 0 || s->pilot_tolerance >= 0 || s->max_error > 0) &&
         s->sampler != SAMPLER_INDEPENDENT)
         return err_set(e,
-                       "--adaptive and --error estimate the error from samples that have to be "
+                       "--adaptive, --adaptive-unbiased and --error estimate the error from samples that have to be "
                        "independent: not with --sampler %s",
                        sampler_kind_names[s->sampler]);
     if (s->adaptive_batch > 0 && s->pilot_tolerance >= 0)

@@ -24,7 +24,7 @@
 #define NATIVE AUDIT_ARCH_AARCH64
 #endif
 
-/* Younger than the headers of Debian 12. */
+/* Newer than the headers of Debian 12. */
 #ifndef SYS_memfd_secret
 #define SYS_memfd_secret 447
 #endif
@@ -33,7 +33,7 @@ struct refused {
     int call, error;
 };
 
-#define X32 0x40000000u /* its numbers begin here */
+#define X32 0x40000000u /* first system call number of the x32 ABI */
 
 size_t confine_filter(bool alone, unsigned char filter[CONFINE_FILTER])
 {
@@ -42,7 +42,7 @@ size_t confine_filter(bool alone, unsigned char filter[CONFINE_FILTER])
         {SYS_memfd_create, ENOSYS},
         {SYS_memfd_secret, ENOSYS},
         {SYS_shmget, ENOSYS},
-        {SYS_io_uring_setup, ENOSYS}, /* whose requests are no system calls */
+        {SYS_io_uring_setup, ENOSYS}, /* its requests would bypass this filter */
         /* from here on: alone */
         {SYS_socket, EACCES},
         {SYS_semget, ENOSYS},
@@ -51,7 +51,7 @@ size_t confine_filter(bool alone, unsigned char filter[CONFINE_FILTER])
         {SYS_ptrace, EPERM},
         {SYS_unshare, EPERM},
         {SYS_setns, EPERM},
-        {SYS_clone3, ENOSYS}, /* whose flags a filter cannot see; clone() is used instead */
+        {SYS_clone3, ENOSYS}, /* a filter cannot see its flags; the C library falls back to clone() */
         {SYS_add_key, ENOSYS},
         {SYS_keyctl, ENOSYS},
     };
@@ -91,7 +91,8 @@ size_t confine_filter(bool alone, unsigned char filter[CONFINE_FILTER])
 #endif
 }
 
-/* As the kernel has them; Debian 12's headers know only the first member [Linux, Documentation/userspace-api/landlock.rst]. */
+/* The kernel's landlock_ruleset_attr, of which Debian 12's headers know only the first member [Linux,
+ * Documentation/userspace-api/landlock.rst]. */
 struct ruleset {
     uint64_t files, network, scoped;
 };
@@ -126,7 +127,8 @@ static bool allow(int ruleset, const char *path, uint64_t rights, struct err *e)
     return ok;
 }
 
-/* A rule holds for all below it, so that what holds something hidden is shown entry by entry, by their real paths. */
+/* A rule covers everything below its path, so a directory that contains something hidden is shown entry by entry;
+ * symbolic links are skipped, as paths are resolved anyway. */
 static bool allow_around(int ruleset, const char *path, const char *const *hidden, struct err *e)
 {
     size_t length = strlen(path);
@@ -186,7 +188,7 @@ bool confine_enter(const void *ctx)
     if (!memory_group_enter(&c->group) || (c->in >= 0 && dup2(c->in, 0) < 0) ||
         (c->out >= 0 && dup2(c->out, 1) < 0))
         return false;
-    /* The C library's own would tell threads that are not there. */
+    /* Not by the C library, which would signal threads that do not exist in this process. */
     if (c->user != 0 && (syscall(SYS_setgroups, 0, NULL) != 0 ||
                          syscall(SYS_setresgid, c->user, c->user, c->user) != 0 ||
                          syscall(SYS_setresuid, c->user, c->user, c->user) != 0))

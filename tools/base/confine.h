@@ -11,8 +11,8 @@
 #include <stddef.h>
 
 struct confine {
-    unsigned user; /* and group; 0: stays who it is */
-    int in, out;   /* stdin and stdout, borrowed; -1: as they are */
+    unsigned user; /* id of the user and group to become; 0: unchanged */
+    int in, out;   /* stdin and stdout, borrowed; -1: unchanged */
     struct memory_group group;
     int files; /* a Landlock ruleset; -1: none. The caller closes it */
 };
@@ -32,7 +32,7 @@ size_t confine_filter(bool alone, unsigned char filter[CONFINE_FILTER]);
 NODISCARD bool confine_files(const char *const *read, const char *const *write,
                              const char *const *hidden, int *ruleset, struct err *e);
 
-/* For struct process: becomes what *ctx, a struct confine, says. Only calls that may follow fork(). */
+/* For struct process, as `before`: applies *ctx, a struct confine. Makes only async-signal-safe calls. */
 bool confine_enter(const void *ctx);
 
 #endif

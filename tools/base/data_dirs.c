@@ -6,7 +6,7 @@
 
 struct data_dirs data_dirs_find(void)
 {
-    /* That of build/assay, wherever one stands. */
+    /* In the checkout of build/assay, whatever the current directory. */
     const struct path beside = fs_beside_program("../reference");
     bool here = access("reference/scenes", R_OK) == 0,
          checkout = here || access(fs_path("%s/scenes", beside.s).s, R_OK) == 0;

@@ -14,7 +14,7 @@
 
 enum { MOST_TRIES = 100, WAIT_US = 20000 };
 
-/* Is what was locked still what the path leads to? Who had it before may have removed it meanwhile. */
+/* Does the path still lead to the locked file? Its previous owner may have removed it meanwhile. */
 static bool is_there(const struct dir_lock *l)
 {
     struct stat held, now;

@@ -7,8 +7,8 @@
 #include <sys/types.h>
 
 struct dir_lock {
-    int fd;    /* of DIR/.assay-lock, in which the process is named; 0: none is held */
-    bool made; /* the directory was not there */
+    int fd;    /* of DIR/.assay-lock, which names the process; 0: no lock is held */
+    bool made; /* dir_lock_take() created the directory */
     char path[4096];
 };
 

@@ -15,7 +15,7 @@
 
 enum { MAX_PATH = 4096 };
 
-/* strcoll(), which alphasort() goes by, would depend on who asks. */
+/* Not alphasort(): its strcoll() depends on the locale. */
 static int by_bytes(const struct dirent **a, const struct dirent **b)
 {
     return strcmp((*a)->d_name, (*b)->d_name);

@@ -11,7 +11,7 @@
 
 enum { TRIES = 100, WAIT_US = 10000 };
 
-/* Of this process: of version 2, or version 1's for memory. */
+/* The control group of this process: of version 2, or of version 1's memory hierarchy. */
 static void own_group(bool second, char path[256])
 {
     char line[512];
@@ -64,7 +64,7 @@ void memory_group_open(struct memory_group *g, size_t bytes)
     const char *root = second ? "/sys/fs/cgroup" : "/sys/fs/cgroup/memory",
                *limit = second ? "memory.max" : "memory.limit_in_bytes",
                *swap = second ? "memory.swap.max" : "memory.memsw.limit_in_bytes";
-    size_t swapped = second ? 0 : bytes; /* version 1 counts both */
+    size_t swapped = second ? 0 : bytes; /* version 1 limits memory plus swap */
     own_group(second, own);
     if ((strlen(own) < 2 ||
          !try_in(g, fs_path("%s%s", root, own).s, limit, swap, bytes, swapped)) &&

@@ -26,11 +26,11 @@ enum { FIRST = 60578, NUM = 61184 - FIRST, TRIES = 500, WAIT_US = 10000 };
 
 static const char lock_dir[] = "/run/assay-users";
 
-/* Does any process run as it? Zombies do not: in a container nobody may ever wait for them. */
+/* Does any process run as this user? Zombies do not count: in a container they may never be reaped. */
 static bool has_processes(unsigned id)
 {
     DIR *d = opendir("/proc");
-    bool found = d == NULL; /* nobody knows */
+    bool found = d == NULL; /* not known: assume so */
     struct dirent *entry;
     while (d != NULL && !found && (entry = readdir(d)) != NULL) {
         char line[256];
@@ -54,8 +54,9 @@ static bool has_processes(unsigned id)
     return found;
 }
 
-/* In a child that is this user: kill(2) with -1 reaches all that it may signal in one go, which a fork bomb cannot outrun. Only
- * calls that may follow fork() in a process with threads; the C library's setresuid() would tell other threads. */
+/* In a child that becomes this user: kill(2) with -1 reaches all processes that it may signal at once, which a fork
+ * bomb cannot outrun. Only async-signal-safe calls, as there may be threads; the C library's setresuid() would signal
+ * these. */
 static void kill_all(unsigned id)
 {
     int status;
@@ -87,7 +88,7 @@ static void remove_objects(unsigned id)
     for (int kind = 0; kind < 3; kind++) {
         char line[512];
         FILE *f = fopen(fs_path("/proc/sysvipc/%s", kinds[kind]).s, "r");
-        char *end = f != NULL ? fgets(line, sizeof line, f) : NULL; /* the head names columns */
+        char *end = f != NULL ? fgets(line, sizeof line, f) : NULL; /* skip the header */
         while (end != NULL && (end = fgets(line, sizeof line, f)) != NULL) {
             /* key id perms, then columns of each kind's own, uid, gid, cuid */
             static const int skip[] = {4, 1, 4};
@@ -141,7 +142,7 @@ static bool leave_nothing(const struct run_user *u, struct err *e)
     return remove_files(u->id, e) && ok;
 }
 
-/* A directory that only root can have made, and in which nobody else can put a lock. */
+/* Makes the directory of locks, which must belong to root and be writable by root alone. */
 static bool make_lock_dir(struct err *e)
 {
     struct stat st;

@@ -44,8 +44,9 @@ static bool join_names(const char *const *keep, char *out, size_t size, struct e
     return true;
 }
 
-/* How the run ended, by the supervisor's report; without one, by the clock. A report written while the whole run was being killed
- * does not count: the program may have failed because its log was gone. no_memory: the kernel killed for memory. */
+/* How the run ended, from the supervisor's report or, without one, from its time. A report written while the whole run
+ * was being killed does not count: the program may have failed because its log was gone. no_memory: the kernel killed a
+ * process for memory. */
 static void read_report(const char *out, const struct sandbox_job *job, bool killed, bool no_memory,
                         const struct err *last, struct sandbox_result *r)
 {
@@ -66,7 +67,7 @@ static void read_report(const char *out, const struct sandbox_job *job, bool kil
         sandbox_conclude(job, known ? word : NULL, last, r);
 }
 
-/* Files that are too large are no output. */
+/* Removes output files that are too large. */
 static void drop_large(const char *out, const struct sandbox_job *job)
 {
     const struct path tree = fs_path("%s/tree.tar", out);
@@ -80,7 +81,7 @@ static void drop_large(const char *out, const struct sandbox_job *job)
         unlink(tree.s);
 }
 
-/* A directory that what runs in the sandbox may write. */
+/* Makes a directory that programs in the sandbox may write to. */
 static bool make_dir_for(const struct sandbox *s, const char *dir, struct err *e)
 {
     if (!fs_make_dirs(dir, e))
@@ -133,7 +134,7 @@ bool sandbox_run(const struct sandbox *s, const struct sandbox_job *job, struct 
     return s->unsafe ? sandbox_run_bare(s, job, out, e) : run_boxed(s, job, out, e);
 }
 
-/* A file that bwrap reads it from; none where the kernel has no filters. */
+/* Writes the system call filter to a file for bwrap; to none if the kernel has no seccomp. */
 static bool write_filter(struct sandbox *s, struct err *e)
 {
     unsigned char filter[CONFINE_FILTER];
@@ -183,7 +184,7 @@ static bool hide(struct sandbox *s, const char *path, struct err *e)
     return true;
 }
 
-/* What would render in place of a program: ours, and others by the names that they are installed under. */
+/* Hides what a program could call instead of rendering itself: ours, and other renderers by their installed names. */
 static bool hide_renderers(struct sandbox *s, struct err *e)
 {
     static const char *const dirs[] = {"/usr/bin", "/usr/local/bin", "/usr/games"};
@@ -206,7 +207,7 @@ bool sandbox_open(bool unsafe, const char *const *hidden, struct sandbox *out, s
     if (!temp_dir_open(&out->dir, "sandbox", e))
         return false;
     const struct path scene = fs_path("%s/probe-scene", out->dir.path);
-    /* Without namespaces, other people's programs get through to what is their own, and no further. */
+    /* Without namespaces, programs may pass through this directory to their own files, but not list it. */
     chmod(out->dir.path, unsafe && out->drop ? 0711 : 0755);
     if (!write_filter(out, e) || !fs_make_dirs(scene.s, e)) {
         sandbox_close(out);

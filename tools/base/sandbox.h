@@ -37,7 +37,7 @@ struct sandbox {
     bool unsafe;         /* no bubblewrap: see above */
     bool drop;           /* we are root: programs run as somebody else */
     struct temp_dir dir; /* for what runs read and write, readable by everybody */
-    char filter[544];    /* a file of it with what seccomp(2) refuses; "": none */
+    char filter[544];    /* path in it of the seccomp(2) filter; "": none */
     char hidden[48]
                [512]; /* files and directories that must not be seen though they lie below /usr */
     int num_hidden;
@@ -45,8 +45,8 @@ struct sandbox {
 
 struct sandbox_limits {
     double wall_s, cpu_s; /* of the run; of each of its processes */
-    size_t memory; /* bytes, of each process, and of all together (looked at five times a second) */
-    size_t disk, file; /* bytes, of all in /box and as much again in /tmp; of one file */
+    size_t memory; /* bytes, of each process, and of all together (checked five times a second) */
+    size_t disk, file; /* bytes: of all in /box, and as much again in /tmp; of one file */
     int processes;     /* and threads */
 };
 extern const struct sandbox_limits sandbox_default; /* 2 min, 4 GiB, 512 MiB, 128 MiB, 64 */
@@ -54,18 +54,18 @@ extern const struct sandbox_limits sandbox_default; /* 2 min, 4 GiB, 512 MiB, 12
 struct sandbox_job {
     const char *const *argv; /* NULL-terminated; argv[0] relative to /box or in PATH */
     const char *
-        tree; /* a tar that everybody can read, unpacked into /box; NULL: none. Where the sandbox is unsafe, "box" beside
-                       * it stands for /box, for one run at a time, so that programs find what they were linked with */
+        tree; /* a world-readable tar, unpacked into /box; NULL: none. If unsafe, "box" beside it serves as /box,
+                       * for one run at a time, so that paths linked into programs stay valid */
     const char *scene; /* a directory that everybody can read, copied to /box/scene; NULL: none */
     const char *const
         *keep;      /* names in /box (letters, digits, . _ -; no directories), NULL at the end */
     bool keep_tree; /* also everything in /box, as "tree.tar" */
     bool tools;     /* a build: it sees all of /usr */
     const char
-        *cache; /* of ccache, which then stands for the compilers, read-only; NULL: none is used */
-    bool fill_cache;     /* it is made, if need be, and may be written */
+        *cache; /* directory of ccache, which then wraps the compilers; read-only; NULL: no ccache */
+    bool fill_cache;     /* the cache is made if need be and is writable */
     const char *library; /* LD_LIBRARY_PATH; NULL: none */
-    const char *out;     /* directory that receives them; made if need be */
+    const char *out;     /* directory that receives what is kept; made if need be */
     const char *log;     /* stdout and stderr; NULL: none */
     struct sandbox_limits limit;
 };
@@ -75,7 +75,7 @@ enum sandbox_end {
     SANDBOX_FAILED,    /* exit status not 0, or a signal */
     SANDBOX_WALL,      /* did not end */
     SANDBOX_CPU,       /* a process used more processor time than it may */
-    SANDBOX_MEMORY,    /* all together */
+    SANDBOX_MEMORY,    /* all processes together use too much */
     SANDBOX_FILE_SIZE, /* wrote a file that is too large */
     SANDBOX_DISK,      /* failed with /box full */
     SANDBOX_UNPACK,    /* the submission does not fit into /box, or holds what cannot be unpacked */
@@ -85,7 +85,7 @@ extern const char *const sandbox_end_name[]; /* "ok", "failed", "wall time", .. 
 
 struct sandbox_result {
     enum sandbox_end end;
-    int status; /* of the program; 128 + n for signal n; where it ended by itself */
+    int status; /* exit status of the program, 128 + n for signal n; if it ended by itself */
     double wall_s, cpu_s;
     char why
         [512]; /* one line, with the program's last lines, in printable ASCII; "" if SANDBOX_OK */
@@ -94,7 +94,7 @@ struct sandbox_result {
 /* Checks that the sandbox works here by running `true` in it, and fails with the reason if it does
  * not; with `unsafe` only that a program can be run. hidden: files and directories (NULL at the end)
  * that no program may read; only those below /usr need it. Our own programs and other renderers
- * there are hidden besides. Makes out->dir. The caller calls sandbox_close(). */
+ * there are hidden as well. Makes out->dir. The caller calls sandbox_close(). */
 NODISCARD bool sandbox_open(bool unsafe, const char *const *hidden, struct sandbox *out,
                             struct err *e);
 /* Removes out->dir. */

@@ -16,10 +16,10 @@
 #include <sys/statvfs.h>
 #include <unistd.h>
 
-enum { OURS_S = 120 /* of what we do as the program's user */, ROOM = 1 << 20 };
+enum { OURS_S = 120 /* time limit of what we run as the program's user */, ROOM = 1 << 20 };
 
-/* One run. The program's user owns box and temp alone, not the directory that they are in, so that nobody can put anything in their place; and
- * whoever is of its group may pass that directory. */
+/* One run. The program's user owns only box and temp, not the directory that contains them, so that it cannot replace
+ * them; its group may pass through that directory. */
 struct bare {
     const struct sandbox *s;
     const struct sandbox_job *job;
@@ -58,7 +58,7 @@ static bool make_dirs(struct bare *b, struct err *e)
             err_set(e, "%s: %s", b->job->cache, strerror(errno)));
 }
 
-/* What the program sees of the machine: as in a sandbox, but all of /usr save what is hidden. */
+/* What the program sees of the machine: as in a sandbox, but all of /usr except what is hidden. */
 static bool show_files(struct bare *b, struct err *e)
 {
     const char *hidden[sizeof b->s->hidden / sizeof *b->s->hidden + 1] = {NULL};
@@ -75,8 +75,8 @@ static bool show_files(struct bare *b, struct err *e)
                          hidden, &b->c.files, e);
 }
 
-/* A shell of the program's user in the box, for what would follow links of the program's if root did it. fsize: of a file that it writes;
- * $1: `word`. */
+/* Runs a shell as the program's user in the box, for work that would follow the program's links if root did it. word:
+ * $1; fsize: limit of a file that it writes; *done: it exited with 0. False only if it could not be started. */
 static bool as_user(struct bare *b, const char *script, const char *word, size_t fsize, int in,
                     int out, bool *done, struct err *e)
 {
@@ -97,7 +97,7 @@ static bool as_user(struct bare *b, const char *script, const char *word, size_t
     return *done || usage.wall_s > 0 || err_set(e, "%.500s", why.msg);
 }
 
-/* Where the machine's own disk is full, nobody can say what a program would have done. */
+/* If the machine's own disk is full, a program's failure says nothing about the program. */
 static bool has_room(const struct bare *b, struct err *e)
 {
     struct statvfs v;
@@ -147,7 +147,7 @@ static bool run_program(struct bare *b, struct sandbox_result *r, struct err *e)
     memory_group_open(&b->c.group, sandbox_all_memory(&b->job->limit));
     if (ok && !process_run(&p, &usage, &last) && usage.wall_s == 0)
         ok = err_set(e, "%.500s", last.msg);
-    if (b->user.id != 0) /* what runs on could change what is handed out */
+    if (b->user.id != 0) /* a process left over could change the output */
         ok = run_user_end(&b->user, e) && ok;
     bool no_memory = memory_group_close(&b->c.group);
     free(l);
@@ -163,7 +163,8 @@ static bool run_program(struct bare *b, struct sandbox_result *r, struct err *e)
     return ok && (r->end == SANDBOX_OK || has_room(b, e));
 }
 
-/* A regular file of the program's, at most `most` bytes and one more; no link, nothing of somebody else's, nothing that waits. */
+/* Copies an output file, at most limit.file + 1 bytes: only a regular file of the program's user; no link, nothing that
+ * blocks. */
 static bool hand_out(const struct bare *b, const char *name, struct err *e)
 {
     char buffer[1 << 16];

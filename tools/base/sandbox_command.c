@@ -78,11 +78,12 @@ static void add_text(struct sandbox_line *l, const char *format, ...)
 
 static const char search_path[] = "/usr/local/bin:/usr/bin:/bin";
 
-/* The program's environment, as bwrap is told it or as env(1) is. box, temp, cache: where the program sees them. */
+/* The program's environment, as options of bwrap or, if by_env, of env(1). box, temp, cache: paths as the program sees
+ * them. */
 static void add_environment(struct sandbox_line *l, bool by_env, const struct sandbox_job *job,
                             const char *box, const char *temp, const char *cache)
 {
-    /* Hits must depend neither on where the sources lie nor on when they were unpacked. */
+    /* Cache hits must depend neither on where the sources are nor on when they were unpacked. */
     const char *const variable[][2] = {
         {"PATH", search_path},
         {"HOME", box},
@@ -111,7 +112,7 @@ static void add_environment(struct sandbox_line *l, bool by_env, const struct sa
     }
 }
 
-/* What a program may need that is no compiler: a shell, and what scripts are made of. */
+/* What a program may need besides compilers: a shell, and the common tools of scripts. */
 static const char *const programs[] = {
     "sh",  "bash",  "env", "prlimit", "python3",  "awk",    "basename", "cat",   "chmod", "cp",
     "cut", "date",  "dd",  "dirname", "echo",     "expr",   "false",    "find",  "grep",  "head",
@@ -120,9 +121,9 @@ static const char *const programs[] = {
     "[",   "touch", "tr",  "true",    "truncate", "uname",  "uniq",     "wc",
 };
 
-/* All of /usr; or its libraries and `programs`, without what compilers keep among the libraries.
- * Neither another renderer that is installed here nor ours is a part of either's machine: a program
- * might run it. */
+/* With tools, all of /usr; else its libraries and `programs`, without the compilers' files among the
+ * libraries. Renderers that are installed here, ours included, are hidden afterwards (add_hidden()): a
+ * program might run them. */
 static void add_usr(struct sandbox_line *l, bool tools)
 {
     if (tools) {
@@ -151,7 +152,7 @@ static void add_usr(struct sandbox_line *l, bool tools)
     }
 }
 
-/* Where it would be seen. */
+/* Hides a path if it would be visible. */
 static void add_hidden(struct sandbox_line *l, const char *path, bool tools)
 {
     struct stat st;
@@ -165,7 +166,7 @@ static void add_hidden(struct sandbox_line *l, const char *path, bool tools)
         add_all(l, (const char *const[]){"--ro-bind", "/dev/null", path, NULL});
 }
 
-/* What both machines have: programs and libraries, no environment, nothing else. */
+/* What both layers have: programs and libraries, an empty environment, nothing else. */
 static void add_system(struct sandbox_line *l, const struct sandbox *s,
                        const struct sandbox_limits *limit, bool tools)
 {
@@ -227,7 +228,7 @@ static void add_inner(struct sandbox_line *l, const struct sandbox *s,
     add_limits(l, job);
 }
 
-/* The supervisor, with what it is told in variables that the program does not get. */
+/* The supervisor, with its parameters in environment variables that the program does not get. */
 static void add_supervisor(struct sandbox_line *l, const struct sandbox_job *job, const char *keep,
                            const char *const where[5])
 {

@@ -15,9 +15,9 @@
 
 enum { RANDOM = 6 /* letters that mkdtemp() puts at the end */, MOST_TRIES = 100 };
 
-/* Opens and locks a directory of this user. Returns 0; EWOULDBLOCK: somebody has it; ENOENT: it is no longer there; another errno, as where
- * nothing can be locked. *fd: -1 or the caller's to close. The lock goes with it, so that it ends with the process however that
- * ends; no child gets it. */
+/* Opens and locks a directory of this user. Returns 0; EWOULDBLOCK if another process holds it; ENOENT if it no longer
+ * exists; else another errno, for example where locks are not supported. *fd: -1, or a descriptor that the caller
+ * closes; the lock ends with it, and so with the process, however that ends. Children do not inherit it. */
 static int lock_dir(const char *path, int *fd)
 {
     struct stat held, now;
@@ -45,7 +45,7 @@ static void remove_old(const char *temp, const char *start)
         const struct path path = fs_path("%s/%s", temp, entry->d_name);
         int fd;
         bool removed = lock_dir(path.s, &fd) == 0 && fs_remove_tree(path.s, &ignored);
-        (void)removed; /* it is in the way of nobody */
+        (void)removed; /* what stays does no harm */
         if (fd >= 0)
             close(fd);
     }
@@ -71,7 +71,7 @@ bool temp_dir_open(struct temp_dir *d, const char *name, struct err *e)
         int why = lock_dir(d->path, &d->lock);
         if (why != EWOULDBLOCK && why != ENOENT)
             return true;
-        /* Another run that looks for old ones has found it before it was locked, and removes it. */
+        /* Another run that looks for old directories found this one before it was locked, and removes it. */
         if (d->lock >= 0)
             close(d->lock);
     }

@@ -13,7 +13,7 @@ struct temp_dir {
  * runs have left, as far as possible. The caller calls temp_dir_close(); until then no other such process removes it. */
 NODISCARD bool temp_dir_open(struct temp_dir *d, const char *name, struct err *e);
 
-/* Removes it, with all that is in it; false with a line if that fails. Nothing where it is closed or was never opened (zero). */
+/* Removes it, with all that is in it; false with a line if that fails. Does nothing if it is closed or zero. */
 bool temp_dir_close(struct temp_dir *d, struct err *e);
 
 #endif

@@ -4,7 +4,7 @@
 
 #include <stddef.h>
 
-/* Appends, as far as there is room. */
+/* Appends to the string in text[size], as far as there is room. */
 void text_append(char *text, size_t size, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 

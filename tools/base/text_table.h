@@ -11,7 +11,7 @@ enum { TEXT_TABLE_COLUMNS = 32, TEXT_TABLE_CELL = 320 };
 struct text_column {
     const char *heading;
     bool is_number;  /* right-aligned */
-    bool is_foreign; /* anybody's text: what Markdown takes for markup is escaped */
+    bool is_foreign; /* untrusted text: Markdown's markup is escaped */
 };
 
 struct text_table {
@@ -24,7 +24,7 @@ struct text_table {
 };
 void text_table_print(FILE *f, const struct text_table *t, bool markdown);
 
-/* A backslash or a character reference for what would end a cell or start markup. */
+/* Prints text with whatever would end a cell or start markup escaped. */
 void text_table_escape(FILE *f, const char *text);
 
 #endif

@@ -143,7 +143,7 @@ static int status(const struct settings *s, const struct suite *suite, struct er
     bool noise = noise_ladder_is_kept(s->opt.golden_dir, suite);
     for (int i = 0; noise && i < suite->num_scenes; i++)
         if (strcmp(suite->scene[i].references_of, suite->scene[i].name) == 0)
-            bad += noise_record_status(s->opt.golden_dir, &suite->scene[i], stdout);
+            bad += noise_record_status(s->opt.golden_dir, &suite->scene[i], &total, stdout);
     struct path first;
     if (!print_orphans(s->opt.golden_dir, suite, &orphans, &first, e))
         return EXIT_NOT_JUDGED;
@@ -175,6 +175,9 @@ static int approve_all(const struct settings *s, const struct suite *suite, stru
         return EXIT_NOT_JUDGED;
     for (int i = 0; (ref = rendered_reference(suite, i, &scene)) != NULL; i++)
         selected += is_selected(s, scene, ref->engine);
+    for (int i = 0; i < suite->num_scenes; i++)
+        if (is_selected(s, &suite->scene[i], "noise"))
+            selected += noise_record_count(s->opt.from_dir, &suite->scene[i]);
     opt.alpha = s->opt.alpha / (selected > 0 ? selected : 1);
     for (int i = 0; (ref = rendered_reference(suite, i, &scene)) != NULL; i++) {
         /* Under --all a reference that is up to date needs no candidate. */

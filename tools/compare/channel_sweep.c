@@ -13,7 +13,7 @@ struct measured channel_sweep_measure(const struct judge *j, const struct pyrami
 {
     struct measured m = region_measure(j, &p->level[level].cell[i], pyramid_rect(p, level, i));
     int around = level + 2 < p->num_levels ? level + 2 : p->num_levels - 1;
-    /* Below tiles whose side is no power of 2 it is the image. */
+    /* Below tiles whose side is not a power of 2, the surroundings are the image. */
     if (p->level[around].side % p->level[level].side != 0)
         around = p->num_levels - 1;
     if (level < around)
@@ -21,10 +21,10 @@ struct measured channel_sweep_measure(const struct judge *j, const struct pyrami
     return m;
 }
 
-/* Beyond that z the smallest log10 p is all that is known. */
+/* The z of region_smallest_log10_p, beyond which log10 p does not change any more. */
 static const double largest_rank = 2146;
 
-/* Tests every region of a level, whose first row is row y of the image, as the image's level `number`. */
+/* Tests every region of level l of p, whose first row is row y of the image; it is the image's level `number`. */
 static void scan(const struct judge *j, const struct pyramid *p, int l, int y, int number,
                  struct channel_sweep *s)
 {
@@ -38,15 +38,15 @@ static void scan(const struct judge *j, const struct pyramid *p, int l, int y, i
         if (!region_testable(j, &m))
             continue;
         s->tested[number]++;
-        /* An exact p only for what may be the smallest: regions without noise on a side and those
-         * whose normal equivalent, good to 3 %, comes near the largest. */
+        /* An exact p is computed only where it may be the smallest: for regions without noise on a
+         * side, and for those whose normal equivalent, good to 3 %, comes near the largest. */
         struct worst_region *worst = &s->worst[m.statistic];
         bool is_ranked = !m.noise_free && !m.silent;
         double z = is_ranked ? region_rank(j, &m) : INFINITY;
         if (is_ranked && (z <= 0 || z < 0.94 * worst->z))
             continue;
         double log10_p = region_log10_p(j, &m, s->channel);
-        /* Of equal ones the larger region counts. */
+        /* Of regions with equal p the larger one counts. */
         if (log10_p < worst->log10_p || (log10_p == worst->log10_p && level->side > worst->side)) {
             struct rect r = pyramid_rect(p, l, i);
             r.y += y;
@@ -79,7 +79,7 @@ static void fill_images(const struct judge *j, const struct pyramid *p, size_t f
     }
 }
 
-/* Everything that is smaller than a tile, of all rows from y on that a and b have. */
+/* Tests everything smaller than a tile in one band: a and b are its rows, the first of which is row y. */
 static bool sweep_band(const struct judge *j, const struct moments *a, const struct moments *b,
                        int y, struct channel_sweep *s, struct comparison *out, struct err *e)
 {
@@ -111,7 +111,7 @@ static int last_band(int height, int band)
     return height < band ? height : height - (height / band - 1) * band;
 }
 
-/* What a sweep needs, of an image of such levels. */
+/* Allocates what a sweep of an image with these levels needs. */
 static bool open_sweep(const struct judge *j, const struct moments *a, const struct moments *b,
                        const struct pyramid *levels, struct channel_sweep *s, struct err *e)
 {
@@ -132,7 +132,7 @@ static bool open_sweep(const struct judge *j, const struct moments *a, const str
            (!is_directed || matched_filter_open(a, b, &s->directed, e));
 }
 
-/* What is no longer needed after the last band. */
+/* Frees what is no longer needed after the last band. */
 static void close_bands(struct channel_sweep *s)
 {
     free(s->part);

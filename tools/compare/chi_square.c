@@ -5,8 +5,8 @@
 #include <math.h>
 #include <string.h>
 
-/* The square of a region's excess over its margin, as of a standard normal law. Where the bias is
- * within the margin it is at most what noise alone would give. */
+/* The square of the normal equivalent of a region's excess over its margin. If the bias is within the
+ * margin, it is stochastically no larger than by noise alone. */
 static double square(const struct measured *m)
 {
     double t = region_excess_t(m);
@@ -16,14 +16,14 @@ static double square(const struct measured *m)
     return z * z;
 }
 
-/* A region without noise has nothing to sum and is no gap either. */
+/* A region without noise adds nothing, but is not a gap in the partition either. */
 static struct part part_of(const struct measured *m)
 {
     return (struct part){m->noise_free ? 0 : square(m), !m->noise_free, true};
 }
 
-/* The next level of whose regions each is the union of some of level l, or -1. Sides are powers of 2
- * up to the tile, which need not be one. */
+/* The next level each of whose regions is a union of regions of level l, or -1. Sides are powers of 2 up
+ * to the tile, which need not be one. */
 static int next_level(const struct pyramid *p, int l)
 {
     for (int i = l + 1; i < p->num_levels; i++)
@@ -32,8 +32,8 @@ static int next_level(const struct pyramid *p, int l)
     return -1;
 }
 
-/* Level l from the one below: its parts if they cover it, itself if it is testable, else what there is
- * of parts. */
+/* Merges level `below` into level l: a region becomes its parts if they cover it, itself if it is
+ * testable, else whatever parts there are. */
 static void merge(const struct judge *j, const struct pyramid *p, int below, int l,
                   const struct part *from, struct part *to)
 {
@@ -63,7 +63,7 @@ static size_t regions_of(const struct pyramid *p, int level)
     return (size_t)p->level[level].nx * (size_t)p->level[level].ny;
 }
 
-/* Every region of level 0 by itself. */
+/* Starts with every testable region of level 0 by itself. */
 static void begin(const struct judge *j, const struct pyramid *p, struct part *part)
 {
     size_t regions = regions_of(p, 0);
@@ -77,7 +77,7 @@ static void begin(const struct judge *j, const struct pyramid *p, struct part *p
     }
 }
 
-/* From level 0 to level `last`; the result is where is returned. `part` has room for the regions of level 0 twice. */
+/* Merges from level 0 to level `last`; returns the result, in one half of `part`, which holds level 0 twice. */
 static struct part *merge_up(const struct judge *j, const struct pyramid *p, int last,
                              struct part *part)
 {

@@ -1,5 +1,5 @@
 /* Many small differences together: the sum of squares over disjoint regions (tools/docs/background/verdict.md, "Dense").
- * Used by compare.c only. */
+ * Used by compare.c and channel_sweep.c only. */
 #ifndef ASSAY_CHI_SQUARE_H
 #define ASSAY_CHI_SQUARE_H
 
@@ -20,7 +20,7 @@ struct part {
     bool whole; /* they cover all of it */
 };
 
-/* The finest partition of a band, as parts of its tiles. `part` has room for its pixels twice. */
+/* The finest partition of a band, as parts of its tiles. `part`: workspace for twice the band's pixels. */
 void chi_square_gather(const struct judge *j, const struct pyramid *band, struct part *part,
                        struct part *tiles);
 

@@ -18,7 +18,8 @@
 const char *const statistic_name[NUM_STATISTICS] = {"image", "pyramid", "dense", "directed",
                                                     "noise"};
 
-/* Skewness is judged where a statistic's part of alpha would be divided by all its regions. */
+/* The critical values at which skewness is judged: a statistic's part of alpha divided by all its
+ * regions. */
 static void set_guards(struct judge *j, size_t regions)
 {
     double tests[NUM_STATISTICS] = {NUM_CHANNELS, NUM_CHANNELS * (double)(regions - 1), 6,
@@ -41,7 +42,7 @@ struct claim {
     bool ok[NUM_CHANNELS];
 };
 
-/* Luminance, which takes longest, R, G, B, and the variances. */
+/* Items of work: luminance, which takes longest, then B, G, R, and the variances. */
 static void claim_work(void *ctx, size_t first, size_t last)
 {
     struct claim *c = ctx;
@@ -56,7 +57,7 @@ static void claim_work(void *ctx, size_t first, size_t last)
     }
 }
 
-/* What the sweeps found, in the order of the channels. */
+/* Collects what the sweeps found, in the order of the channels, whatever thread finished first. */
 static void gather(struct judge *j, struct claim *c, struct worst_region worst[2],
                    struct chi_square *dense)
 {
@@ -82,8 +83,8 @@ static void gather(struct judge *j, struct claim *c, struct worst_region worst[2
     j->num_tests[STATISTIC_VARIANCE] = j->share[STATISTIC_VARIANCE] > 0 && c->has_noise;
 }
 
-/* The region's own MDB or, if it is too skewed to be tested, that of the smallest tested region
- * around it: there the same error is diluted. */
+/* The MDB of tile i or, if it is too skewed to be tested, that of the smallest testable region that
+ * contains it, converted to the tile, as the same error is diluted there. */
 static double mdb_of(const struct judge *j, const struct pyramid *p, size_t i)
 {
     struct measured own = region_measure(j, &p->level[0].cell[i], pyramid_rect(p, 0, i));
@@ -156,7 +157,7 @@ static void fill_statistics(struct judge *j, const struct worst_region worst[2],
                  out->variance.ratio);
 }
 
-/* How far below the level it is held to the smallest p of a statistic is; above 0: rejected. */
+/* How far the smallest p of a statistic is below its share; it rejects from -log10(alpha) on. */
 static double evidence(const struct comparison *c, int s)
 {
     return c->statistic[s].num_tests > 0 ? log10(c->statistic[s].share) - c->statistic[s].log10_p

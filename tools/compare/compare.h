@@ -15,7 +15,7 @@ struct compare_options {
     double margin_variance; /* relative, of the variance per observation; 0: reported, never tested,
                                as different estimators differ rightly; else its interval must lie
                                inside for EQUIVALENT and NO DIFFERENCE FOUND */
-    int threads;            /* at most so many, of which 5 have work; the same numbers with any */
+    int threads;            /* upper limit; at most 5 are used; the results do not depend on it */
 };
 
 /* The claim's tests in groups, each with its own part of alpha. */
@@ -39,7 +39,7 @@ struct statistic {
 /* A change that, made to B, removes at least nine tenths of the difference (hint.h). */
 struct hint {
     const char *name; /* "shift by x", static; NULL: no change that is known does */
-    double removed;   /* share of the squared difference, noise removed; about 1 */
+    double removed;   /* removed share of the squared difference, corrected for noise; about 1 */
     double amount;    /* 0 where unit is "" */
     const char *unit; /* "%", "% of the mean", "in the exponent", "px", "" */
 };
@@ -78,14 +78,14 @@ struct comparison {
     struct hint hint; /* not set by compare_moments() */
     struct variance_ratio variance;
     struct region global[4];  /* per channel and luminance */
-    struct region worst;      /* of all regions, smallest p in units of the level it is held to */
+    struct region worst;      /* the region with the smallest p relative to its level */
     struct region worst_tile; /* reporting tile whose interval reaches furthest out, luminance */
     double mdb_global;        /* of luminance */
     double mdb_tile;          /* largest over the reporting tiles, luminance */
     double rms_bias;          /* debiased RMS error over pixels and RGB (weighted as luminance) in
                                  units of the mean luminance of B: sqrt(max(0, ..)) */
-    double extra_factor;      /* not decided: about how many times the samples would decide, at most
-                            verdict_largest_factor, which stands for more; else 1 */
+    double extra_factor;      /* if undecided: about how many times the samples would decide, at most
+                            verdict_largest_factor, which means "or more"; else 1 */
     bool skew_limited; /* some regions of a tile's size or larger were too skewed for their t and
                             were judged only as part of larger ones */
     int finest_side;   /* smallest side of which at least half the luminance regions were tested */

@@ -9,7 +9,7 @@
 #include <string.h>
 
 static const double smallest_variance =
-    0.03; /* of the image's mean: noise-free pixels weigh finitely */
+    0.03; /* of its mean over the image: keeps weights of noise-free pixels finite */
 
 const char *const error_mode_name[NUM_ERROR_MODES] = {
     [ERROR_SCALE] = "scale",
@@ -42,13 +42,13 @@ size_t error_modes_at(const struct error_modes_frame *f, int x, int y)
     return (size_t)(y - f->y) * (size_t)f->across + (size_t)(x - f->x);
 }
 
-/* So much further on every side, beyond the image, too. */
+/* r, larger by `by` on every side, even beyond the image. */
 static struct rect grown(struct rect r, int by)
 {
     return (struct rect){r.x - by, r.y - by, r.width + 2 * by, r.height + 2 * by};
 }
 
-/* Beyond the image all is 0. */
+/* Loads n, mean and sd of one side; beyond the image all is 0. */
 ISA_CLONES static void fill_side(const struct error_modes *modes, struct error_modes_frame *f,
                                  int side)
 {
@@ -107,7 +107,7 @@ static inline int places(int i, int reach, int size)
 }
 
 /* One plane: out = mean of f(in) over the (2 reach + 1)^2 pixels around each of r that lie in the image, without the
- * pixel itself; f is the square or nothing. */
+ * pixel itself; f is the square or the identity. */
 static inline __attribute__((always_inline)) void around(const struct error_modes *modes,
                                                          const struct error_modes_frame *f,
                                                          struct rect r, const double *in,
@@ -138,7 +138,7 @@ static inline __attribute__((always_inline)) void around(const struct error_mode
     }
 }
 
-/* Moves the frame to the pixels r of the image and computes what is asked of them. */
+/* Moves the frame to the pixels r of the image and computes what `depth` asks for. */
 enum depth { VARIANCES, WEIGHTS, ALL };
 ISA_CLONES static void move_frame(const struct error_modes *modes, struct error_modes_frame *f,
                                   struct rect r, enum depth depth)
@@ -261,7 +261,7 @@ static double over(double x)
     return (x < 1 ? x : 1) - x;
 }
 
-/* Minus the central difference, from the rows (or, down, columns) beside that of the pixel. */
+/* Minus the central difference, averaged over the two rows (for a shift down, columns) beside the pixel's. */
 ISA_CLONES static void shift(const struct error_modes *modes, bool down, int y,
                              double *const out[3])
 {
@@ -281,7 +281,7 @@ ISA_CLONES static void shift(const struct error_modes *modes, bool down, int y,
     }
 }
 
-/* B of channel from[c] around the pixel less B around it. */
+/* B of channel from[c] around the pixel minus B of channel c around it. */
 ISA_CLONES static void swap(const struct error_modes *modes, const int from[3], int y,
                             const struct error_change *out)
 {
@@ -298,7 +298,8 @@ ISA_CLONES static void swap(const struct error_modes *modes, const int from[3], 
     }
 }
 
-/* B of another pixel less B around its own. That of column 0 is number `other` of frame g, the next `step` further on. */
+/* B at another pixel minus B around this one. For column 0 the other is element `other` of frame g; the next is `step`
+ * on. */
 ISA_CLONES static void move(const struct error_modes *modes, const struct error_modes_frame *g,
                             size_t other, ptrdiff_t step, int y, const struct error_change *out)
 {
@@ -319,7 +320,7 @@ ISA_CLONES static void move(const struct error_modes *modes, const struct error_
     }
 }
 
-/* A pixel that stays where it is, is not changed. */
+/* A pixel that is mapped to itself does not change. */
 static void stay(int x, const struct error_change *out)
 {
     out->d[0][x] = out->d[1][x] = out->d[2][x] = out->coupled[x] = 0;

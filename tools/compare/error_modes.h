@@ -1,7 +1,7 @@
 /* What a known kind of error would add to each pixel, as an image: the directions of matched_filter.c.
  *
  * A direction is computed from the two sides themselves. To keep the level of the test, nothing that is
- * seen in pixel p may enter the direction or its weight in p: neighbours stand for it. */
+ * seen in pixel p may enter the direction or its weight in p: its neighbours are used instead. */
 #ifndef ASSAY_ERROR_MODES_H
 #define ASSAY_ERROR_MODES_H
 
@@ -26,7 +26,8 @@ enum error_mode_kind {
 
 extern const char *const error_mode_name[NUM_ERROR_MODES];
 
-/* A part of the image with what is around it: a plane of `across` columns for n, three for R, G, B of the others. */
+/* A part of the image with a margin around it: one plane for n, three (R, G, B) of the others, `across` columns
+ * each. */
 struct error_modes_frame {
     int x, y, across, down; /* where it lies in the image */
     size_t room;            /* pixels that a plane has room for */
@@ -34,28 +35,28 @@ struct error_modes_frame {
     double *sd[2];          /* of their means, 0 where exact */
     double *root[2];        /* cube roots of their third cumulants */
     double *around[2];      /* squares of sd, mean over the 5 x 5 pixels around p without p */
-    /* 1 / variance around A and B together, which is taken to be at least 3 % of the image's mean; 0
-     * where a channel has no noise anywhere. */
+    /* 1 / (variance of A plus B around p), which is taken to be at least 3 % of its mean over the image;
+     * 0 if a channel has no noise anywhere. */
     double *weight;
-    /* A and B weighted by the inverse of `around`: its noise is uncorrelated with that of A - B if the
-     * variances near p are those of p. */
+    /* Mean of A and B weighted by the inverse of `around`: its noise is uncorrelated with that of A - B
+     * if the variances near p are those of p. */
     double *mix;
     double *mix_around; /* mean of mix over the 3 x 3 pixels around p without p */
     double *b_around;   /* of B */
-    double *row;        /* for sums */
-    double *data;       /* of all these */
+    double *row;        /* workspace for sums along rows */
+    double *data;       /* the memory that holds all these */
 };
-/* In the first plane; those of the other channels are `room` further on each. */
+/* Index of pixel (x, y) of the image in the first plane; each further channel adds `room`. */
 size_t error_modes_at(const struct error_modes_frame *f, int x, int y);
 
 /* What directions are computed from, for some rows of the image at a time. */
 struct error_modes {
     const struct moments *side[2];
     int width, height;
-    double least[3]; /* of the variance that makes a weight */
+    double least[3]; /* lower limit of the variance in `weight`, per channel */
     struct error_modes_frame own, turned,
-        columns; /* of the rows, of those that stand in their place top to bottom, and, of a
-                                                   square image, of the columns that do */
+        columns; /* of the rows; of the rows that a flip top to bottom puts in their place;
+                                                   of a square image, of the columns that transposing does */
 };
 
 /* At least 2 pixels. Fails only out of memory. Release with error_modes_free(). */
@@ -63,16 +64,16 @@ NODISCARD bool error_modes_open(const struct moments *a, const struct moments *b
                                 struct error_modes *out, struct err *e);
 void error_modes_free(struct error_modes *modes);
 
-/* Whether the direction exists for this size of image. */
+/* Does the direction exist for this size of image? */
 bool error_mode_applies(const struct error_modes *modes, enum error_mode_kind kind);
 
 enum { ERROR_MODES_BAND = 32 };
-/* Goes to rows y .. y+rows-1, ERROR_MODES_BAND at most. */
+/* Prepares rows y .. y+rows-1 for error_mode_row(), ERROR_MODES_BAND at most. */
 void error_modes_go_to(struct error_modes *modes, int y, int rows);
 
-/* One direction in one row of these, by columns. */
+/* One direction in one of the prepared rows, by columns. */
 struct error_change {
-    double *d[3]; /* free of what is seen in the pixel */
+    double *d[3]; /* independent of what is seen in the pixel */
     /* Extra variance of sum w D. The direction at p is computed from other pixels, whose directions
      * in turn are computed from p; where d is made of B alone, these products do not average out. */
     double *coupled;
@@ -80,7 +81,7 @@ struct error_change {
 void error_mode_row(const struct error_modes *modes, enum error_mode_kind kind, int y,
                     const struct error_change *out);
 
-/* Whether a multiple of the direction means something: a shift by 0.3 pixels, but no flip by 0.3. */
+/* Does a multiple of the direction make sense? There is a shift by 0.3 pixels, but no flip by 0.3. */
 bool error_mode_has_amount(enum error_mode_kind kind);
 
 #endif

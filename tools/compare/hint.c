@@ -12,7 +12,7 @@ enum {
     BLOCK = 8,               /* side of the blocks in which small differences are seen best */
     ENOUGH_TO_FIT = 1 << 15, /* pixels */
     ENOUGH = 1 << 18,
-    GRID = 16, /* amounts that are tried first, either way; of shifts pixels */
+    GRID = 16, /* amounts tried first in each direction; for shifts, pixels */
     REFINE = 20
 };
 static const double enough_removed = 0.9, certain = 5 /* standard errors of noise alone */;
@@ -24,7 +24,7 @@ struct value {
 
 /* A sample of blocks that stands for the whole image: their pixels in A and B, block after block. */
 struct sample {
-    int step; /* each step-th block */
+    int step; /* every step-th block is taken */
     struct value (*side[2])[3];
 };
 
@@ -41,8 +41,8 @@ struct images {
 /* Squared differences, noise removed: of pixels, and of the means of blocks. */
 struct excess {
     double before[2], after[2];
-    double all_before, all_after; /* of the means of blocks, noise and all */
-    size_t num[2], of; /* pixels and blocks that have a partner, and all pixels that were asked */
+    double all_before, all_after; /* of the means of blocks, noise included */
+    size_t num[2], of; /* pixels and blocks with a counterpart in B; all pixels looked at */
 };
 
 static double variance(const struct images *m, int side, size_t i)
@@ -56,7 +56,7 @@ static size_t at(const struct images *m, int x, int y)
     return 3 * ((size_t)y * (size_t)m->side[1]->width + (size_t)x);
 }
 
-/* From which pixel of B the changed pixel comes: the same for changes of values alone. */
+/* The pixel of B that a change puts at (x, y); (x, y) itself if it changes only values. */
 static size_t source(const struct images *m, enum error_mode_kind kind, int x, int y)
 {
     int w = m->side[1]->width, h = m->side[1]->height;
@@ -72,13 +72,13 @@ static struct value value_of(const struct images *m, int side, size_t i)
     return (struct value){moments_mean(m->side[side], i), variance(m, side, i)};
 }
 
-/* A change to be tried; the amount is the logarithm of a factor or an exponent, in means, or in pixels. */
+/* A change to try. amount: the logarithm of a factor or an exponent, an offset in units of B's mean, or pixels. */
 struct change {
     enum error_mode_kind kind;
-    double amount, factor; /* its exponential */
+    double amount, factor; /* factor: exp(amount) */
 };
 
-/* B between two pixels. False where it would come from beyond the border. */
+/* B shifted by the amount, interpolated between two pixels. False if that would be beyond the border. */
 static bool shifted(const struct images *m, const struct change *how, int x, int y,
                     struct value out[3])
 {
@@ -98,7 +98,7 @@ static bool shifted(const struct images *m, const struct change *how, int x, int
     return true;
 }
 
-/* B, changed: mean and variance. `own`: what it was. */
+/* Mean and variance of the changed B at (x, y); `own`: unchanged. False if they are not defined there. */
 static bool changed(const struct images *m, const struct change *how, int x, int y,
                     const struct value own[3], struct value out[3])
 {
@@ -130,7 +130,7 @@ static bool changed(const struct images *m, const struct change *how, int x, int
     return true;
 }
 
-/* The block whose first pixel is number *first of the sample; then that of the next. */
+/* Adds one block, whose first pixel is number *first of the sample; advances *first to the next block. */
 static void add_block(const struct images *m, const struct change *how, const struct sample *s,
                       int column, int row, size_t *first, struct excess *out)
 {
@@ -223,7 +223,7 @@ static double removed_by(const struct images *m, enum error_mode_kind kind, doub
     return e.before[best] > 0 ? 1 - e.after[best] / e.before[best] : 0;
 }
 
-/* The amount that removes most: on a grid, then between its neighbours by thirds. */
+/* The amount that removes most: the best on a grid, refined by ternary search between its neighbours. */
 static double fit(const struct images *m, enum error_mode_kind kind)
 {
     static const double reach[NUM_ERROR_MODES] = {[ERROR_SCALE] = 2,
@@ -270,7 +270,7 @@ static struct hint describe(enum error_mode_kind kind, double amount, double sha
     return h;
 }
 
-/* The variance of a block is at least a share of the image's, and a little more than none. */
+/* Weights: a block's variance counts as at least the share `least` of the image's, plus a trifle (`dust`). */
 static bool open_images(const struct moments *a, const struct moments *b, struct images *m)
 {
     static const double least = 0.03, dust = 1e-6;
@@ -315,13 +315,13 @@ static void close_images(struct images *m)
     free(m->many.side[0]);
 }
 
-/* In the order in which they are preferred. */
+/* In order of preference. */
 static const enum error_mode_kind order[NUM_ERROR_MODES] = {
     ERROR_FLIP_X,  ERROR_FLIP_Y,  ERROR_ROTATE, ERROR_TRANSPOSE, ERROR_SWAP_RB,
     ERROR_SWAP_RG, ERROR_SWAP_GB, ERROR_SCALE,  ERROR_OFFSET,    ERROR_GAMMA,
     ERROR_SHIFT_X, ERROR_SHIFT_Y, ERROR_CLAMP};
 
-/* What is tried on the images, and what came of each. */
+/* The changes tried on the images, and their results. */
 struct trials {
     const struct images *images;
     double amount[NUM_ERROR_MODES], share[NUM_ERROR_MODES];
@@ -342,7 +342,7 @@ static void try(void *ctx, size_t first, size_t last)
 bool hint_add(const struct moments *a, const struct moments *b, int threads, struct comparison *c,
               struct err *e)
 {
-    static const double clearly = 0.01; /* more is removed than by what is simpler */
+    static const double clearly = 0.01; /* how much more a change must remove than those before it in `order` */
     struct images m;
     struct trials t = {.images = &m};
     double most = enough_removed - clearly;

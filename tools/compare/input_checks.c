@@ -45,14 +45,14 @@ static bool check_pixel(const struct moments *m, size_t p, bool exact, struct er
     return true;
 }
 
-/* Its variance is the other side's too, and its n no count (moments.h). */
+/* Is the unit "picture"? Then the variance is the other side's, too, and n is not a count (moments.h). */
 static bool is_image(const struct moments *m)
 {
     return strcmp(m->unit, "picture") == 0;
 }
 
-/* Checks one side and gathers what it contributes to the judge. An observation's typical brightness
- * where it matters is E[x^2]/E[x], for something seen rarely its brightness when seen. */
+/* Checks one side and gathers what it contributes to the judge. `event`: the typical
+ * brightness of an observation that matters, E[x^2]/E[x]; for something rarely seen, its brightness when seen. */
 static bool check_side(const struct moments *m, struct judge *j, struct err *e)
 {
     bool exact = strcmp(m->unit, "exact") == 0, replicates = strcmp(m->unit, "replicate") == 0;
@@ -84,7 +84,7 @@ static bool check_side(const struct moments *m, struct judge *j, struct err *e)
     return true;
 }
 
-/* The same seeds on both sides: no difference could show, and none would be there to find. */
+/* Refuses the same seeds on both sides: their observations are the same, so that no difference could show. */
 static bool check_shared(const struct moments *a, const struct moments *b, struct err *e)
 {
     if (strcmp(a->unit, "exact") == 0 || strcmp(b->unit, "exact") == 0 || is_image(a))

@@ -5,8 +5,8 @@
 
 #include "region.h"
 
-/* Each failure is a line in e: see compare_moments(). On success *j holds all that regions share but
- * what the number of regions decides (z_guard, num_tests). */
+/* Each failure is a line in e: see compare_moments(). On success *j holds everything that regions
+ * share, except what depends on their number (z_guard, num_tests). */
 NODISCARD bool input_checks_run(const struct moments *a, const struct moments *b,
                                 const struct compare_options *opt, struct judge *j, struct err *e);
 

@@ -5,7 +5,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* What some neighbouring pixels add to them. */
+/* The contributions of some neighbouring pixels to struct matched_sums. */
 enum { CHUNK = 64 };
 struct chunk {
     double w[3][CHUNK], unit[3][CHUNK], size[3][CHUNK];
@@ -39,7 +39,7 @@ ISA_CLONES static void weigh(const struct error_modes_frame *f, int side, size_t
         }
         cube = copysign(cube, sign * cube);
         double v = deviation * deviation, k3 = cube * cube * cube;
-        struct estimate est = pyramid_estimate_from(sum, v, k3, n[x]);
+        struct pixel_estimate est = pyramid_estimate_from(sum, v, k3, n[x]);
         t->mean[side][x] = sum;
         t->v[side][x] = v;
         t->k3[side][x] = k3;
@@ -110,7 +110,7 @@ void matched_filter_free(struct matched_filter *f)
     *f = (struct matched_filter){.row = NULL};
 }
 
-/* Rows to which the directions have gone. */
+/* Adds a row that error_modes_go_to() has prepared. */
 static void add_row(const struct judge *j, struct matched_filter *f, int y)
 {
     const size_t width = (size_t)f->modes.width;

@@ -1,4 +1,4 @@
-/* Tests against known kinds of error (tools/docs/background/verdict.md, "Directed"). Used by compare.c only. */
+/* Tests against known kinds of error (tools/docs/background/verdict.md, "Directed"), for channel_sweep.h. */
 #ifndef ASSAY_MATCHED_FILTER_H
 #define ASSAY_MATCHED_FILTER_H
 
@@ -22,12 +22,12 @@ NODISCARD bool matched_filter_open(const struct moments *a, const struct moments
                                    struct matched_filter *out, struct err *e);
 void matched_filter_free(struct matched_filter *f);
 
-/* Rows y .. y+rows-1, which follow those before. root[i] gets, of A's and B's pixels, what pyramid_build() wants. */
+/* Adds rows y .. y+rows-1, in order. root[0] and root[1] get the root of pyramid_build() for A's and B's pixels. */
 void matched_filter_add(const struct judge *j, struct matched_filter *f, int y, int rows,
                         double *const root[2]);
 
-/* All directions that apply to this size of image, after all rows. Counts its tests in j->num_tests. *found is the direction of
- * the smallest p, *log10_p (0 if none could be tested). */
+/* After all rows: tests the directions that apply to this size of image, and counts the tests in j->num_tests. *log10_p
+ * is the smallest p (0 if none could be tested), *found its direction. */
 void matched_filter_test(struct judge *j, const struct matched_filter *f,
                          enum error_mode_kind *found, double *log10_p);
 

@@ -11,7 +11,7 @@
 enum { SMALLEST_BAND = 32 }; /* rows */
 const double float_tolerance = 1e-5;
 
-/* Estimates in neighbouring pixels of one side: arrays that stay in the first cache, for vectors. */
+/* Estimates in a run of pixels of one side: arrays for SIMD that stay in the L1 cache. */
 enum { RUN = 64 };
 struct run {
     double n[RUN], v_scale[RUN], k_scale[RUN], mean[RUN], v[RUN], k3[RUN];
@@ -46,7 +46,7 @@ ISA_CLONES static void estimate(const struct moments *m, bool exact, int channel
     }
     for (size_t p = 0; p < num; p++) {
         const double v = r->v[p], k3 = root != NULL ? root[first + p] : r->k3[p];
-        const struct estimate est = pyramid_estimate_from(r->mean[p], luminance ? v * v : v,
+        const struct pixel_estimate est = pyramid_estimate_from(r->mean[p], luminance ? v * v : v,
                                                           luminance ? k3 * k3 * k3 : k3, r->n[p]);
         r->v[p] = est.v;
         r->k3[p] = est.k3;
@@ -56,9 +56,9 @@ ISA_CLONES static void estimate(const struct moments *m, bool exact, int channel
     }
 }
 
-static struct estimate of_pixel(const struct run *r, size_t p)
+static struct pixel_estimate of_pixel(const struct run *r, size_t p)
 {
-    return (struct estimate){r->mean[p],         r->v[p],      r->k3[p],       r->var_v[p],
+    return (struct pixel_estimate){r->mean[p],         r->v[p],      r->k3[p],       r->var_v[p],
                              r->var_v_normal[p], r->var_k3[p], r->tolerance[p]};
 }
 
@@ -67,7 +67,7 @@ static bool is_exact(const struct moments *m)
     return strcmp(m->unit, "exact") == 0;
 }
 
-struct estimate pyramid_pixel_estimate(const struct moments *m, size_t pixel, int channel)
+struct pixel_estimate pyramid_pixel_estimate(const struct moments *m, size_t pixel, int channel)
 {
     struct run r;
     const bool exact = is_exact(m);
@@ -76,7 +76,7 @@ struct estimate pyramid_pixel_estimate(const struct moments *m, size_t pixel, in
     return of_pixel(&r, 0);
 }
 
-void pyramid_add_pixel(struct cell *dst, const struct estimate *a, const struct estimate *b)
+void pyramid_add_pixel(struct cell *dst, const struct pixel_estimate *a, const struct pixel_estimate *b)
 {
     dst->a += a->mean;
     dst->b += b->mean;
@@ -102,9 +102,9 @@ static void add_cell(struct cell *dst, const struct cell *src)
     dst->tolerance += src->tolerance;
 }
 
-/* Of a law that takes the value x with probability p_x, n observations are all a and m all b, for any a
- * and b != a, with sum_a p_a^n (sum_{b != a} p_b^m) <= sum_a p_a p_a^(n-1) (1 - p_a)^m <= max over p of
- * p^(n-1) (1 - p)^m, which is at p = (n-1)/(n-1+m). */
+/* log10 of a bound of the probability that n observations of one distribution are all a and m others all b,
+ * for any a and b != a. With p_x the probability of the value x, it is sum_a p_a^n (sum_{b != a} p_b^m) <=
+ * sum_a p_a p_a^(n-1) (1 - p_a)^m <= max over p of p^(n-1) (1 - p)^m, attained at p = (n-1)/(n-1+m). */
 static double log10_one_value_each(double n, double m)
 {
     double k = n - 1, all = k + m;
@@ -143,7 +143,7 @@ static void fill_pixels(const struct moments *a, const struct moments *b, int ch
             estimate(a, exact_a, channel, p, num, root != NULL ? root[0] : NULL, &run[0]);
             estimate(b, exact_b, channel, p, num, root != NULL ? root[1] : NULL, &run[1]);
         }
-        struct estimate ea = of_pixel(&run[0], p % RUN), eb = of_pixel(&run[1], p % RUN);
+        struct pixel_estimate ea = of_pixel(&run[0], p % RUN), eb = of_pixel(&run[1], p % RUN);
         level->cell[p] = (struct cell){0};
         pyramid_add_pixel(&level->cell[p], &ea, &eb);
         if (observed && one_value(a, p, channel) && one_value(b, p, channel))
@@ -203,7 +203,7 @@ struct pyramid pyramid_levels(int width, int height, int tile)
     }
 }
 
-/* Zeroed, in the memory of `old` if there is enough of that. */
+/* Allocates zeroed cells, in the memory of `old` if that is large enough; else frees it. */
 static bool alloc_cells(struct pyramid *p, struct pyramid old, struct err *e)
 {
     p->room = pyramid_regions(p);

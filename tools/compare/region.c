@@ -5,10 +5,10 @@
 #include <math.h>
 #include <stdio.h>
 
-static const double skew_limit = 0.2;       /* of ln p, where a p must be trusted as it is */
-static const double skew_limit_raised = 4;  /* of ln p, where p makes up for it */
-static const double largest_gx = 0.3;       /* |g| x there, as the next term has (g x)^2 */
-static const double skew_limit_widened = 1; /* of ln p, where the interval does */
+static const double skew_limit = 0.2;       /* skewness factor, in ln p, up to which a p is used as it is */
+static const double skew_limit_raised = 4;  /* the same where p is raised by it */
+static const double largest_gx = 0.3;       /* limit of |g| x there, as the next term has (g x)^2 */
+static const double skew_limit_widened = 1; /* the same where an interval is widened by it */
 static const double least_dof = 0.2;        /* below, the end of an interval is beyond any double */
 static const double largest_t = 1e9;
 const double region_smallest_log10_p = -1e6;
@@ -123,7 +123,8 @@ bool region_is_hopeless(const struct judge *j, const struct cell *cell, int stat
     return is_beyond(cell, j->z_guard[statistic], skew_limit_raised);
 }
 
-/* t is beyond z but for rounding. */
+/* Is the skewness factor within `limit`, and |g| x within gx? t_guard is the larger critical value except for
+ * rounding. */
 static bool is_within(const struct judge *j, const struct measured *m, double skew, double limit,
                       double gx)
 {
@@ -169,8 +170,8 @@ static double log10_p_missed(const struct judge *j, double excess, int channel)
     return fmax(region_smallest_log10_p, -excess * j->n_min / (j->event[channel] * log(10)));
 }
 
-/* Of a region without noise, for |d| beyond what is no difference by `excess`. Two tests where a law
- * for both sides can be asked for. */
+/* log10 p of a region without noise whose |d| exceeds margin and tolerance by `excess`. If
+ * log10_alike is known there are two tests, and the smaller p is doubled. */
 static double log10_p_noise_free(const struct judge *j, const struct measured *m, double excess,
                                  int channel)
 {
@@ -180,13 +181,13 @@ static double log10_p_noise_free(const struct judge *j, const struct measured *m
     return fmin(0, log10(2) + fmin(missed, m->log10_alike));
 }
 
-/* ln of what skewness may put on the p of t. Beyond x = 1/g the expansion behind it has turned round. */
+/* ln of the factor by which skewness may raise the p of t; constant beyond x = 1/g, where the expansion fails. */
 static double skew_at(double skew, double t)
 {
     return skew_factor(skew, fmin(t, 1 / skew));
 }
 
-/* By which p is raised; 0 where it is trusted as it is. */
+/* The skewness by which p is raised; 0 where p is used as it is. */
 static double skew_of_p(const struct judge *j, const struct measured *m)
 {
     return is_unskewed(j, m) ? 0 : fmax(m->skew, m->skew_around);
@@ -239,7 +240,7 @@ double region_pixel_t(const struct judge *j, const struct cell *cell, double *re
     return region_t(&m);
 }
 
-/* *x: quantile of alpha less the factor that skewness may put on it; false if that factor is too
+/* *x: the quantile of alpha divided by the factor that skewness may cause; false if that factor is too
  * large to be trusted. */
 static bool raised_quantile(double skew, double alpha, double dof, double limit, double *x)
 {

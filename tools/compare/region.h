@@ -1,4 +1,4 @@
-/* The test of one region of a claim (tools/docs/background/verdict.md, "One region"). Used by compare.c only. */
+/* The test of one region of a claim (tools/docs/background/verdict.md, "One region"), and texts about regions. */
 #ifndef ASSAY_REGION_H
 #define ASSAY_REGION_H
 
@@ -12,7 +12,7 @@ struct judge {
     double mean_b;                /* luminance of the image B */
     double floor;                 /* lower bound of the unit of relative quantities, radiance */
     double event[NUM_CHANNELS];   /* brightness of the brightest kind of single observation seen */
-    bool is_pooled;               /* third cumulants are those of the whole image in each pixel */
+    bool is_pooled;               /* each pixel has the skewness of the whole image (noise_estimate.h) */
     bool exact[2];                /* A, B are closed forms */
     double n_min;                 /* fewest observations of any pixel; INFINITY if both are exact */
     double share[NUM_STATISTICS]; /* of alpha */
@@ -30,9 +30,9 @@ struct measured {
     double v;         /* variance of d */
     double v_margin; /* variance of A - (1 + margin) B: for every test and interval with a margin */
     double dof;
-    double dof_normal; /* if the law is normal; for heavier tails it says more of the mean of t^2 */
+    double dof_normal; /* as for a normal distribution; predicts the mean of t^2 better under heavy tails */
     double skew;       /* of d: |g| plus one standard error */
-    double skew_around; /* the same as what lies around has it; INFINITY: not asked */
+    double skew_around; /* the same with the surroundings' skewness; INFINITY: not determined */
     double t_guard;     /* critical value at which skewness is judged */
     double log10_alike; /* of the cell */
     /* One side (not a closed form) shows no noise where the other does. Its few samples may all
@@ -45,12 +45,12 @@ struct measured {
 
 struct measured region_measure(const struct judge *j, const struct cell *cell, struct rect r);
 
-/* True: region_is_normal() will be false, for its skewness alone; most small regions fail there.
- * False says nothing. */
+/* A quick test: if true, region_is_normal() is false by skewness alone, as for most small regions. False
+ * says nothing. */
 bool region_is_skewed(const struct judge *j, const struct cell *cell);
-/* The same of region_testable(). */
+/* The same for region_testable(). */
 bool region_is_hopeless(const struct judge *j, const struct cell *cell, int statistic);
-/* The same as from region_measure() of one pixel: region_t() and the relative difference. */
+/* region_t() of a single pixel, and its relative difference, as by region_measure() but faster. */
 double region_pixel_t(const struct judge *j, const struct cell *cell, double *relative);
 
 /* The same for sums over the image with weights w, which may be negative: unit = sum |w| unit, size =
@@ -79,7 +79,7 @@ double region_excess_t(const struct measured *m);
  * would explain the difference were all missed. */
 double region_log10_p(const struct judge *j, const struct measured *m, int channel);
 
-/* About the normal equivalent of that p, good to 3 %, of a region with noise: for ranking only. */
+/* The normal equivalent of that p, accurate to about 3 %, for a region with noise: for ranking only. */
 double region_rank(const struct judge *j, const struct measured *m);
 
 /* Two-sided log10 p of "no bias", raised by the skew factor: for the histogram of tiles. */
@@ -88,7 +88,7 @@ double region_log10_p_equal(const struct judge *j, const struct measured *m, int
 /* difference / std_error, within +-1e9 where there is no noise. */
 double region_t(const struct measured *m);
 
-/* Relative bias that is found with 95 %, at most region_mdb_none; for a region that is tested. */
+/* The relative bias that is found with a probability of 95 %, at most region_mdb_none; for a testable region. */
 double region_mdb(const struct judge *j, const struct measured *m, int channel);
 
 extern const double region_smallest_log10_p; /* -1e6 */
@@ -106,7 +106,7 @@ extern const char *const channel_name[NUM_CHANNELS];
 /* "the image (red)" or "16 x 16 pixels at 32,48 (luminance)". */
 void region_name(int width, int height, struct rect r, int channel, char *text, size_t size);
 
-/* All of a struct region but mdb, which is 0. */
+/* Fills all of a struct region except mdb, which is 0. */
 struct region region_fill(const struct judge *j, const struct cell *cell, struct rect r,
                           int channel);
 

@@ -13,10 +13,12 @@ static const double skew_limit_widened = 1;
  * more observations. */
 static const double shared_by_chance = 1.0 / 3;
 static const double shared_level = 1e-6;
-/* Of the squared difference: bounds of the variance for any correlation of channels come near this alone. */
+/* Largest ratio of squared difference and variance that counts as shared noise: bounds of the variance for any
+ * correlation of channels can alone bring it near this. */
 static const double least_shared = 0.25;
 
-/* Paths in one observation of the kind in which both sides can be counted; 0 if there is none. */
+/* Paths per observation, in a unit that both sides have (paths, or else observations of one kind); 0 if there is
+ * none. */
 static double paths(const struct moments *m, const struct moments *other)
 {
     if (strcmp(m->unit, "picture") == 0)

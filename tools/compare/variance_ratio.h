@@ -15,8 +15,8 @@ struct variance_ratio variance_ratio_test(const struct moments *a, const struct 
 size_t variance_ratio_shared(const struct moments *a, const struct moments *b);
 
 /* The mean of (A - B)^2 over its stated variance, over pixels with noise and in the channel where it is largest: 1 for
- * equal and independent sides, less where they share their noise. 1, too, where it is more than 1/4, or
- * independent sides could have as little with a chance of 1e-6 (left tail of chi-square). */
+ * equal and independent sides, less where they share their noise. Also 1 if it is more than 1/4, or if
+ * independent sides have as little with a chance above 1e-6 (left tail of chi-square). */
 double variance_ratio_of_difference(const struct moments *a, const struct moments *b);
 
 #endif

@@ -23,7 +23,8 @@ static void place(const struct comparison *c, const struct region *r, char *text
 }
 
 /* How many times the samples would bring this interval inside its margin: planned for equal engines
- * and 95 % over all the intervals or, if there were enough for that, from the difference seen. */
+ * and a probability of 95 % over all intervals or, if there are enough samples for that, from the
+ * difference seen. */
 static double factor_needed(const struct region *r, size_t num_intervals)
 {
     if (!r->ci_valid)
@@ -73,7 +74,8 @@ static void judge_equivalence(struct comparison *c, const struct region *tiles)
                  100 * furthest->ci_lo, 100 * furthest->ci_hi, 100 * furthest->margin);
 }
 
-/* Without a margin nothing can be shown equal: all there is to say is what would have been seen. */
+/* Without a margin equivalence cannot be shown: the reason says what error would have been
+ * found. */
 static void judge_search(struct comparison *c)
 {
     char image[32], tile[32];
@@ -90,7 +92,7 @@ static void judge_search(struct comparison *c)
              region_mdb_text(c->mdb_global, image), region_mdb_text(c->mdb_tile, tile));
 }
 
-/* For EQUIVALENT and NO DIFFERENCE FOUND the variance must be what was asked of it, too. */
+/* EQUIVALENT and NO DIFFERENCE FOUND also require that the variance is inside its margin. */
 static void judge_variance(struct comparison *c, const struct compare_options *opt)
 {
     const struct variance_ratio *v = &c->variance;
@@ -143,7 +145,8 @@ bool verdict_rejects(const struct comparison *c, int statistic, double alpha)
     return st->num_tests > 0 && st->log10_p <= log10(alpha * st->share);
 }
 
-/* Regions say where; without one, the statistic whose p is furthest below its level. */
+/* The reason names a region that rejects, which says where; without one, the statistic furthest
+ * below its level. */
 static void judge_different(struct comparison *c, const struct compare_options *opt)
 {
     char where[96];

@@ -4,20 +4,20 @@
 
 #include "compare.h"
 
-/* For compare.c. Fills verdict, reason and extra_factor; all else of c is filled but for the images' pixels. `tiles`
- * are the luminance regions of the tiles_x x tiles_y reporting tiles. */
+/* For compare.c. Fills verdict, reason and extra_factor; everything else in c, except the maps' pixels, must be filled.
+ * `tiles` are the luminance regions of the tiles_x x tiles_y reporting tiles. */
 void verdict_decide(struct comparison *c, const struct compare_options *opt,
                     const struct region *tiles);
 
 /* Does a statistic's smallest p reject at its share of alpha? */
 bool verdict_rejects(const struct comparison *c, int statistic, double alpha);
 
-/* "p = 3e-05"; what is smaller than anybody can mean is "p < 1e-12". */
+/* "p = 3e-05"; anything smaller than 1e-12 is "p < 1e-12". */
 struct verdict_p {
     char s[24];
 } verdict_p(double log10_p);
 
-/* The largest extra_factor; it stands for more. */
+/* The largest extra_factor; it means "this or more". */
 extern const double verdict_largest_factor;
 /* What extra_factor says: "about 2.5 times the samples would decide", or what else can be done. */
 void verdict_more_samples(double factor, const char *of_what, char text[128]);

@@ -111,7 +111,7 @@ static void climb(const struct run *r, const struct converge_job *job, int engin
         total += (o->ladder[i] + start) * o->replicates;
     bool ok = true;
     for (int i = 0; ok && i < o->num_rungs; i++) {
-        double cpu_s;
+        double cpu_s = 0;
         free(out->version);
         ok = converge_render(
             job, (enum converge_engine)engine, i, o->ladder[i], images, &cpu_s, &out->version,

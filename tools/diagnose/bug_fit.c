@@ -8,26 +8,27 @@
 static const double cell_dof = 5;
 /* Facts are sums over whole images: no firefly decides them. */
 static const double fact_dof = 30;
-/* How well an effect is known to be the same at another size. */
+/* Relative error of an effect at another image size. */
 const double bug_fit_model_error = 0.01;
 static const double fact_error[NUM_FACTS] = {
     [FACT_SAMPLES] = 0.01, [FACT_SPREAD] = 0.05, [FACT_PIXELS] = 0.05, [FACT_IMAGE] = 0.05};
-/* Where all pixels take as many samples, as with a rule that never stops: that they do not, too, speaks against it. */
+/* If all pixels take the same number of samples, as by a rule that never stops, any other number speaks against the
+ * bug. */
 static const double exact_samples = 1e-3;
-/* What floats, stored and rendered, are good for. */
+/* Relative error of floats, stored or rendered. */
 const double bug_fit_rounding = 1e-5;
 /* A free amplitude costs this much log likelihood: about half the logarithm of the number of values. */
 static const double amplitude_cost = 6;
 static const double least_amplitude = 0.1, largest_amplitude = 4;
 const double bug_fit_largest_excess = 6;
-/* A ratio of two radiances is one where the lower is at least this share of the image's mean. */
+/* Factors are formed only where the correct radiance is more than this share of the image's mean. */
 static const double least_light = 1e-3;
-/* Two bugs that add more than so many times the light that is there add up. */
+/* Two bugs that each add more than this many times the correct light are summed. */
 static const double much_light = 2;
-/* Of the difference between product and sum: how well is known what two bugs do together. */
+/* Uncertainty of the joint effect of two bugs, as a share of the difference between product and sum. */
 static const double unsure = 0.5;
 
-/* fmin() and fmax() of numbers; those are calls to a library. */
+/* fmin() and fmax() for numbers (not NaN), inlined; those of the library are calls. */
 static inline double at_most(double x, double most)
 {
     return x < most ? x : most;
@@ -38,8 +39,8 @@ static inline double at_least(double x, double least)
     return x > least ? x : least;
 }
 
-/* The variance of the mean of value i, if the bug makes it `factor` times noisier than stated. A cell that by luck states less
- * than the correct renderer has at as many samples is not believed. */
+/* The variance of the difference from "correct" in value i, if the bug makes it `factor` times noisier than stated: at
+ * least the correct renderer's at the same number of samples, as a cell may state less by luck. */
 static inline double variance_of(const struct signature *seen, const struct signature *correct,
                                  int i, double factor)
 {
@@ -63,7 +64,7 @@ static double inflation(const struct effect *e, const struct signature *seen)
     return factor;
 }
 
-/* A cell counts as the mean of its three values; one logarithm is taken for them, of the product. */
+/* A cell counts once, as the mean over its channels; for speed, one logarithm is taken, of their product. */
 static void add_cells(const struct observation *clue, const struct effect *e, double amplitude,
                       double factor, struct tally *t)
 {
@@ -107,7 +108,7 @@ static double image_fact(const struct effect *e, const struct observation *clue)
     return s;
 }
 
-/* An excess of chi-square over that of so many values, where it is more than noise. */
+/* The excess of chi-square over its mean for this many values if it is more than noise, else 0. */
 static double beyond_noise(double excess, double values)
 {
     const double noise =
@@ -190,8 +191,8 @@ const struct effect *bug_fit_effect(const struct view *v, int bug, int second, b
     return room;
 }
 
-/* The largest over the views at hand: only some of them show how pixels depend on each other. Where a bug makes all renders
- * the same, their average is no surer than one of them. */
+/* The largest over all views of the catalogue, as only some show how pixels depend on each other. If a bug makes all
+ * renders the same, their average is no more precise than one of them. */
 static double inflation_of(const struct catalogue *c, int bug, const struct observation *clue)
 {
     double factor = 1, repeats = 1;
@@ -217,8 +218,8 @@ static void sum_up(struct tally *to, const struct tally *t)
     to->all += t->all;
 }
 
-/* What bugs do to a view: of two the likelier of product and sum, in *t with its likelihood, and in `room`; of a single one *t
- * is left alone. */
+/* The effect of bugs on a view: of two, the likelier of product and sum, in `room`, with its tally in *t; for a single
+ * bug *t is not changed. */
 static const struct effect *likelier(const struct bug_fit *f, int clue, const struct candidate *b,
                                      double factor, struct effect room[2], struct tally *t)
 {
@@ -237,7 +238,7 @@ static const struct effect *likelier(const struct bug_fit *f, int clue, const st
     return &room[1];
 }
 
-/* share: of the inflation, as an exponent. */
+/* share: exponent of the noise inflation that is applied. *largest is raised to the whole inflation. */
 static struct tally view_with(const struct bug_fit *f, int clue, const struct candidate *b,
                               double share, double *largest)
 {
@@ -278,8 +279,9 @@ static struct tally total_with(const struct bug_fit *f, const struct candidate *
     return sum;
 }
 
-/* How much a bug adds to the noise of the other views is known from one of them only: none of it, its root or all of it are
- * equally likely beforehand, and the likeliest stands for the mean of the three. What is left is judged with all. */
+/* The noise inflation of a bug is known from some views only; in the others none of it, its square root or all of it
+ * are equally likely a priori, and the likeliest stands for the mean of the three. The residual is judged with all of
+ * it. */
 static struct tally total(const struct bug_fit *f, const struct candidate *b)
 {
     static const double share[] = {0, 0.5};
@@ -324,8 +326,8 @@ static void project_facts(const struct observation *clue, const struct effect *e
     }
 }
 
-/* Least squares with the weights of "correct". given: a bug that is there in any case, of whose effect what bug and second
- * add is judged; -1: none. */
+/* Least squares with the weights of "correct". given: a bug that is taken to be there, so that only what bug and second
+ * add to its effect is judged; -1: none. */
 static struct projection project(const struct bug_fit *f, int bug, int second, int given)
 {
     struct projection p = {0};
@@ -384,7 +386,7 @@ static double likelihood_at(const struct bug_fit *f, int bug, double amplitude)
         .log_likelihood;
 }
 
-/* Golden section: of the two points within, one is a point of the section before. */
+/* Golden-section search: one of the two inner points is reused from the step before. */
 double bug_fit_refine(const struct bug_fit *f, int bug, double at)
 {
     const double golden = 0.6180339887498949, reach = 1.5;
@@ -427,7 +429,7 @@ double bug_fit_t(const struct bug_fit *f, const struct candidate *c)
 double bug_fit_worst(const struct bug_fit *f, const struct candidate *c, int *clue)
 {
     static const double clear =
-        20; /* standard deviations: edges of lamps differ between right programs */
+        20; /* standard deviations: edges of lamps differ between correct programs */
     double worst = 0;
     *clue = -1;
     for (int k = 0; k < f->num_clues; k++) {

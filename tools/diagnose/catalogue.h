@@ -26,7 +26,7 @@ struct bug {
     char name[64];         /* of NAME.patch; NAME-VARIANT: catalogue_same_mistake() */
     char what[256];        /* its line "Bug:" */
     char where[160];       /* its line "Where:", the place in the assignment */
-    char patch_sha256[65]; /* of what it says, removes and adds, without the lines around */
+    char patch_sha256[65]; /* of its text and of the lines that it removes and adds, without context lines */
 };
 
 struct effect {
@@ -39,12 +39,12 @@ struct effect {
 struct view {
     char name[128];              /* "13_square_patch-hemisphere" */
     char scene[64], variant[64]; /* variant: "" or "pathtracer-hemisphere" */
-    char option[5][16];          /* with these options besides; none: what the suite renders */
+    char option[5][16];          /* additional options; none: as the suite renders it */
     const char *options[6];      /* the same, NULL at the end */
     char scene_sha256[65];
-    int width, height; /* of the renders that it was made of; their ratio is that of every image */
+    int width, height; /* of the renders that it was made from; every image has their aspect ratio */
     int spp;           /* of one render of a diagnosis */
-    int renders;       /* with seeds of their own; 4 or more: also stated_error.h is asked */
+    int renders;       /* with different seeds; with 4 or more, stated errors are tested, too (stated_error.h) */
     bool fixed_spp;    /* the mean depends on the number of samples asked for (adaptive) */
     uint64_t seed;
     struct signature correct;
@@ -71,7 +71,7 @@ const struct view *catalogue_view(const struct catalogue *c, const char *name);
 /* Its number, -1 if there is none. */
 int catalogue_bug(const struct catalogue *c, const char *name);
 
-/* One mistake may stand in a program in several ways: NAME-VARIANT is another way to make the mistake NAME. */
+/* Are both the same mistake? A mistake can be made in several ways: NAME-VARIANT is another way to make NAME. */
 bool catalogue_same_mistake(const struct bug *a, const struct bug *b);
 /* Its name without the variant. */
 void catalogue_mistake(const struct bug *b, char name[64]);

@@ -10,7 +10,7 @@
 
 /* Bugs this many times less likely than the best are still named with it. */
 static const double tie = 20;
-/* A number of samples has to be off by so many standard deviations. */
+/* Standard deviations by which the number of samples has to be off. */
 static const double samples_z = 7;
 
 static int by_likelihood(const void *a, const void *b)
@@ -70,7 +70,7 @@ static bool gate_mean(const struct observation *clue, double alpha, int num_test
     return ok;
 }
 
-/* A renderer that takes another number of samples than it was asked for. */
+/* Does the renderer take another number of samples than the correct one? */
 static bool takes_other_samples(const struct observation *clue)
 {
     const struct signature *a = &clue->seen, *c = &clue->view->correct;
@@ -114,7 +114,7 @@ static bool gate(const struct observation *clue, int num_clues, double alpha, bo
 
 enum { LEADERS = 8 }; /* of pairs */
 
-/* With all ways to make the same mistake. */
+/* Is the bug left out, as opt->without or as another way to make the same mistake? */
 static bool is_excluded(const struct catalogue *c, const struct diagnose_options *opt, int bug)
 {
     int without = opt->without != NULL ? catalogue_bug(c, opt->without) : -1;
@@ -170,15 +170,15 @@ static void rank_free(const struct bug_fit *f, struct candidate *all, int num)
     qsort(all, (size_t)num, sizeof *all, by_likelihood);
 }
 
-/* Two of one part of the assignment are more often a third that is not known. */
+/* Are both in one part of the assignment? Such a pair is more often a third bug that is not known. */
 static bool is_of_one_part(const struct bug *a, const struct bug *b)
 {
     size_t n = strcspn(a->where, ",");
     return n == strcspn(b->where, ",") && strncmp(a->where, b->where, n) == 0;
 }
 
-/* Does its effect stand out of its own noise in a view? Random numbers that are shared move an image by chance: what was stored
- * is one throw, and beside another bug it explains whatever is left. */
+/* Does its effect stand out from its own noise in any view? Shared random numbers change an image by chance: the stored
+ * effect is one realisation, and beside another bug it would explain any residual. */
 static bool is_reproducible(const struct bug_fit *f, int bug)
 {
     static const double least = 10; /* mean square over variance; of such bugs it is 6 at most */
@@ -224,8 +224,8 @@ static bool gate_lead(const struct bug_fit *f, const struct candidate *best, dou
     return true;
 }
 
-/* Put in at its full strength, a bug, or two at once, has to leave noise, and half of what is clear has to be gone. Where
- * nothing is, and images state their error, its own sum over all views says enough. */
+/* At full strength, a bug, or two at once, has to leave only noise and to remove half of the difference that stands
+ * out. If nothing stands out, and images state their error, the directed statistic over all views suffices. */
 static bool is_explanation(const struct bug_fit *f, const struct diagnose_options *opt,
                            const struct candidate *c)
 {
@@ -236,7 +236,7 @@ static bool is_explanation(const struct bug_fit *f, const struct diagnose_option
            bug_fit_worst(f, c, &clue) <= (c->second >= 0 ? 0 : most_left);
 }
 
-/* Of what is left with one of the two alone, does the other explain most? */
+/* Does the second bug explain most of the residual that `one` leaves alone? */
 static bool is_needed_beside(const struct bug_fit *f, const struct candidate *two, int one)
 {
     static const double most_left = 0.1;
@@ -244,7 +244,8 @@ static bool is_needed_beside(const struct bug_fit *f, const struct candidate *tw
     return 1 - two->explained <= most_left * (1 - (isnan(alone) ? 0 : alone));
 }
 
-/* Effects of two do not quite multiply: more than noise may be left if it is little of each view, and no others come near. */
+/* The effects of two bugs do not exactly multiply: more than noise may be left if it is little of each view and no
+ * other pair comes near. */
 static bool is_nearly_all(const struct bug_fit *f, const struct diagnose_options *opt,
                           const struct candidate *best, const struct candidate *next)
 {
@@ -256,7 +257,8 @@ static bool is_nearly_all(const struct bug_fit *f, const struct diagnose_options
            (next == NULL || next->log_likelihood <= (1 - near) * best->log_likelihood);
 }
 
-/* In logarithms. Bugs that leave noise are told apart by what the model knows of variances, to this share of the lead. */
+/* The difference in log likelihood within which bugs are tied. Those that leave only noise differ by modelled variances
+ * alone, which are accurate to this share of the lead. */
 static double tie_of(const struct diagnose_options *opt, const struct candidate *best)
 {
     static const double variance_error = 0.005;
@@ -273,7 +275,7 @@ static bool is_among(const struct catalogue *c, const struct diagnosis *d, int n
     return false;
 }
 
-/* Of the ways to make a mistake the likeliest stands for all. */
+/* Names the likeliest bugs; of several ways to make a mistake, the likeliest stands for all. */
 static void name(const struct bug_fit *f, const struct diagnose_options *opt,
                  const struct candidate *all, int num, double bound, struct diagnosis *out)
 {
@@ -305,7 +307,8 @@ static void name(const struct bug_fit *f, const struct diagnose_options *opt,
     out->probability = named / sum;
 }
 
-/* Two at once, where no single one leaves noise; a pair is told beside a single one only if it does. */
+/* Tries two bugs at once if no single one leaves only noise; a pair replaces a named single bug only if the pair
+ * does. */
 static bool name_pair(const struct bug_fit *f, const struct diagnose_options *opt,
                       const struct candidate *single, int num, struct diagnosis *out, struct err *e)
 {

@@ -23,8 +23,8 @@ struct diagnose_options {
         by_likelihood; /* no other test shows that something is wrong, as for images that state no
                         * error. A bug must then exceed "correct" by diagnose_bound() and explain
                         * what stands out from noise */
-    bool pairs;  /* where no single one explains: two bugs at once, with by_likelihood */
-    double clip; /* radiance at which views are cut off; 0: none */
+    bool pairs;  /* with by_likelihood: if no single bug explains the images, two at once */
+    double clip; /* radiance at which images are clipped; 0: none */
 };
 
 enum finding { FINDING_CORRECT, FINDING_BUG, FINDING_UNKNOWN };
@@ -58,7 +58,7 @@ struct diagnosis {
     double t;            /* directed statistic of the first over all views */
     double largest_lead; /* of any bug at full strength over "correct", natural logarithm */
     double
-        log_likelihood; /* of "correct": to hold catalogues of the same cells against each other */
+        log_likelihood; /* of "correct": to compare catalogues with the same cells */
     int num_named; /* the first so many explain the images and cannot be told apart; 0 unless FINDING_BUG */
     double probability; /* of those together, among all known bugs, equally likely beforehand */
 };
@@ -70,7 +70,7 @@ NODISCARD bool diagnose(const struct catalogue *c, const struct observation *clu
 struct evidence diagnose_evidence(const struct catalogue *c, const struct observation *clue,
                                   const struct candidate *candidate);
 
-/* What a lead has to reach. */
+/* The log likelihood over "correct" that a bug has to reach: ln(number of bugs / alpha). */
 double diagnose_bound(const struct catalogue *c, double alpha);
 
 #endif

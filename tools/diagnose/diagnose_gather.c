@@ -40,8 +40,8 @@ bool diagnose_gather_program(const struct diagnose_gather_options *opt, const ch
     return true;
 }
 
-/* Another program may sample another way: only its means are held against bugs, and by a margin only, which cells may lie off
- * by as if it were noise. */
+/* Another program may sample differently: only its means are compared with bugs, and the margin by which cells may be
+ * off is added to their noise. */
 static void allow_conventions(double margin, struct observation *clue)
 {
     struct signature *s = &clue->seen;
@@ -52,7 +52,7 @@ static void allow_conventions(double margin, struct observation *clue)
         s->var[i] += pow(margin * clue->view->correct.mean[i], 2);
 }
 
-/* asked: 0 where an image does not say, and it matters only for adaptive sampling. */
+/* asked: samples per pixel asked for, which matters only for adaptive sampling; 0: not known. */
 static bool read_image(const struct view *v, const char *path, int asked, bool is_ours,
                        struct observation *clue, struct err *e)
 {
@@ -90,7 +90,7 @@ static const char *subject_of(const json_t *results)
     static const char *const known[] = {ENGINES_WITH_GOLDENS(ENGINE_WORD) "truth"};
     json_each(claim, json_object_get(results, "claims")) {
         const char *a = member_text(claim, "a");
-        bool is_known = strncmp(a, ours, strlen(ours)) == 0;
+        bool is_known = strcspn(a, "-") == strlen(ours) && strncmp(a, ours, strlen(ours)) == 0;
         for (size_t k = 0; k < sizeof known / sizeof *known; k++)
             is_known |= strcmp(a, known[k]) == 0;
         if (!is_known)
@@ -99,7 +99,7 @@ static const char *subject_of(const json_t *results)
     return ours;
 }
 
-/* Of a claim's side, from the folder of results.json. */
+/* The path of a claim's file of one side, relative to the folder of results.json. False if there is none. */
 static bool file_of(const json_t *claim, const char *side, const char *json_path, char *path)
 {
     const char *file = member_text(json_object_get(claim, "files"), side);
@@ -110,7 +110,7 @@ static bool file_of(const json_t *claim, const char *side, const char *json_path
     return snprintf(path, MAX_PATH, "%.*s%s", stem, json_path, file) < MAX_PATH;
 }
 
-/* What claims of this scene and engine were judged by. */
+/* The files and the margin by which claims of this scene and engine were judged. */
 struct judged_by {
     char image[MAX_PATH], of_ours[MAX_PATH]; /* "": none; ours has the engine's pixel filter */
     double margin;                           /* the widest */
@@ -136,7 +136,8 @@ static struct judged_by find_judged(const json_t *results, const char *json_path
     return out;
 }
 
-/* The catalogue is of the box of one pixel: of an image with another filter, by how much it differs from ours with that. */
+/* The catalogue has the box of one pixel: an image with another filter is replaced by the catalogue's correct image
+ * plus the difference from our image with that filter. */
 static bool take_filter_off(const char *of_ours, struct observation *clue, struct err *e)
 {
     struct observation right;

@@ -8,7 +8,7 @@
 
 enum { FEWEST_CONSISTENT = 4 };
 
-/* How far R may lie from 1: ours is independent, so all that counts is alpha. */
+/* How far R may be from 1: our samples are independent, so that only alpha matters. */
 static const double consistency_margin = 0.02;
 
 static bool render_one(const struct diagnose_job *job, int k, struct moments *out, struct err *e)

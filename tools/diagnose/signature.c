@@ -6,7 +6,7 @@
 #include <math.h>
 #include <string.h>
 
-/* Of the logarithm of the variance of a sample: how much it may change with what a pixel covers. */
+/* Standard deviation of the change of ln(variance of a sample) with another size of pixels. */
 static const double other_size = 0.35;
 
 static bool check(const struct moments *m, int columns, struct err *e)
@@ -41,7 +41,7 @@ static void add_pixel(const struct moments *m, size_t p, int cell_at, struct sig
     }
 }
 
-/* Of the number of samples: all alike unless the render is adaptive. */
+/* Sets n and FACT_SAMPLES; all pixels have the same number of samples unless the render is adaptive. */
 static void set_samples(const struct moments *m, double asked, struct signature *s)
 {
     size_t pixels = (size_t)m->width * (size_t)m->height;
@@ -79,7 +79,7 @@ bool signature_of(const struct moments *m, int columns, double asked, struct sig
 
 double signature_mean(const struct signature *s)
 {
-    double sum[3] = {0}; /* of each channel: additions that need not wait for each other */
+    double sum[3] = {0}; /* per channel: independent chains of additions, which run in parallel */
     for (int i = 0; i < 3 * s->columns * s->rows; i += 3)
         for (int k = 0; k < 3; k++)
             sum[k] += s->mean[i + k];

@@ -1,8 +1,8 @@
-/* What a diagnosis sees of a scene's image: means over a coarse grid of cells, how sure they are, and
- * a few facts about the noise.
+/* What a diagnosis sees of a scene's image: means over a coarse grid of cells, their uncertainty, and a
+ * few facts about the noise.
  *
  * A cell is a square of pixels; across an image there are at most SIGNATURE_SIDE cells, a number that is fixed for
- * each scene, so images of any size whose sides are whole numbers of cells can be held against each other,
+ * each scene, so images of any size whose sides are whole numbers of cells can be compared with each other,
  * as long as they show the same field of view. Cells are numbered row by row from the top left; each has three channels, RGB. */
 #ifndef ASSAY_SIGNATURE_H
 #define ASSAY_SIGNATURE_H
@@ -16,7 +16,7 @@ enum {
     SIGNATURE_VALUES = 3 * SIGNATURE_CELLS
 };
 
-/* Logarithms of what is 1 for an image made as asked by a renderer that states its error rightly. */
+/* Logarithms of ratios that are 1 for an image made as asked by a renderer that states its error correctly. */
 enum fact {
     FACT_SAMPLES, /* samples in a pixel over samples asked for */
     FACT_SPREAD,  /* variance of one sample over that of the correct renderer */
@@ -26,7 +26,7 @@ enum fact {
 };
 
 struct signature {
-    int columns, rows, cell; /* cell: its side in pixels; of an average of sights the first's */
+    int columns, rows, cell; /* cell: its side in pixels; of an average, the first one's */
     double mean[SIGNATURE_VALUES];
     double var[SIGNATURE_VALUES]; /* of the mean */
     double k3[SIGNATURE_VALUES];  /* third cumulant of the mean */
@@ -37,17 +37,17 @@ struct signature {
     double fact_sd[NUM_FACTS];
 };
 
-/* columns: cells across, at most SIGNATURE_SIDE. asked: samples per pixel that were asked for; 0: not known. Fails on sides that are not whole numbers of
- * cells, on pixels with fewer than 2 observations, and on moments that do not state an error ("stratified",
- * "exact"). FACT_SAMPLES is known if `asked` is. */
+/* columns: cells across, at most SIGNATURE_SIDE. asked: samples per pixel that were asked for; 0: not known. Fails on
+ * sides that are not whole numbers of cells, on pixels with fewer than 2 observations, and on moments that do not state
+ * an error ("stratified", "exact"). FACT_SAMPLES is known if `asked` is. */
 NODISCARD bool signature_of(const struct moments *m, int columns, double asked,
                             struct signature *out, struct err *e);
 
-/* Over cells and channels. */
+/* The mean over cells and channels. */
 double signature_mean(const struct signature *s);
 
-/* The average of num >= 1 independent sights of one shape, as of one longer render; FACT_SAMPLES is
- * averaged, the others are those of the first. */
+/* The average of num >= 1 independent signatures of one shape, as of one longer render; FACT_SAMPLES is
+ * averaged, the other facts are those of the first. */
 struct signature signature_average(const struct signature *s, int num);
 
 /* FACT_PIXELS and FACT_IMAGE from R with its 1 - alpha interval and S over `renders` images. Two images
@@ -57,8 +57,8 @@ void signature_set_stated_error(struct signature *s, double pixels, double lo, d
                                 double image, int renders, double alpha);
 
 /* FACT_SPREAD of s against the correct renderer's: log ratio of the sums of `spread`, its standard deviation
- * from the residuals of the cells (ratio estimator). Unknown where either has no spread. Where pixels are of another
- * size it is known to a third only: how much a sample varies depends on how much a pixel covers. */
+ * from the residuals of the cells (ratio estimator). Unknown where either has no spread. If pixels have another
+ * size, it is known only to about a third, as the variance of a sample depends on how much a pixel covers. */
 void signature_set_spread(struct signature *s, const struct signature *correct);
 
 /* s with at least the variance and the third cumulant that means of the correct renderer have at as many samples: a render
@@ -66,7 +66,7 @@ void signature_set_spread(struct signature *s, const struct signature *correct);
 struct signature signature_as_noisy_as(const struct signature *s, const struct signature *correct);
 
 /* The same as moments over cells, for compare_moments(): n, M2 and M3 such that the variance and the third
- * cumulant of the mean are those of the sight. The caller frees them. */
+ * cumulant of the mean are those of the signature. The caller frees them. */
 NODISCARD bool signature_moments(const struct signature *s, struct moments *out, struct err *e);
 
 #endif

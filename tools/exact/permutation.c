@@ -25,7 +25,7 @@ static double choose(int n, int k)
     return round(c);
 }
 
-/* Swapping all of A and B changes no |t|. */
+/* The lowest p that can be reached. Swapping all of A and B does not change |t|, so two labellings tie. */
 static double smallest_p(int num_a, int num_b, int sides)
 {
     double all = choose(num_a + num_b, num_a);
@@ -42,12 +42,13 @@ int permutation_needed(double alpha, int sides)
     return 0;
 }
 
-/* The sums of z over the rows of A are the last of num_a rows of `sum`, of which row i has those over the first i + 1 rows;
- * those before row `first` are there. Returns the largest, either way or in the direction of sign. */
+/* Row i of the num_a rows of `sum` becomes the sums of z over the first i + 1 rows labelled A; those before row `first`
+ * are valid already. Returns the largest of the last row, which has the sums over all of A: absolute or, with t->sign,
+ * signed. */
 ISA_CLONES static double largest_sum(const struct permutation_table *t, const int *row, int first,
                                      double *sum)
 {
-    enum { STEP = 8 }; /* numbers of the widest vector */
+    enum { STEP = 8 }; /* doubles in the widest SIMD register */
     for (int i = first; i < t->num_a; i++) {
         const double *z = t->z + (size_t)row[i] * t->num;
         double *to = sum + (size_t)i * t->num;
@@ -71,7 +72,8 @@ ISA_CLONES static double largest_sum(const struct permutation_table *t, const in
     return best[0];
 }
 
-/* Next subset of num_a of rows in lexicographic order; the first place that changed, -1 after the last. */
+/* Advances to the next subset of num_a rows in lexicographic order; returns the first place that changed, -1 at the
+ * end. */
 static int next_subset(int *row, int num_a, int rows)
 {
     int i = num_a - 1;
@@ -177,8 +179,8 @@ static void describe(const struct permutation_table *t, size_t r, struct permuta
     out->difference = b > 0 ? fmax(-1e6, fmin(1e6, d / b)) : copysign(1e6, d);
 }
 
-/* The difference of a region's mean, in units of at least 5 % of the image's, that exceeds the critical sum with
- * about 95 %. */
+/* The difference of a region's mean, relative to B there (at least 5 % of the image's mean), that exceeds the critical
+ * sum with a probability of about 95 %. */
 static double region_found(const struct permutation_table *t, size_t r, double critical)
 {
     if (!(t->spread[r] > 0))
@@ -190,8 +192,8 @@ static double region_found(const struct permutation_table *t, size_t r, double c
     return fmin(region_mdb_none, (t_of_sum(t, critical) + stats_t_quantile(0.05, dof)) * se / unit);
 }
 
-/* The largest over the smallest squares that hold a tile, in luminance; in a larger square the tile's error is
- * diluted. */
+/* The largest such difference over the smallest squares that hold a tile, in luminance; in a square larger than the
+ * tile its error is diluted. */
 static double tile_found(const struct permutation_table *t, int tile, double critical)
 {
     size_t first = t->num - t->num / NUM_CHANNELS, level = t->num - 1;

@@ -1,6 +1,6 @@
 /* An exact test of "A and B come from the same law" from replicates: if they do, which images are
  * called A is arbitrary, and every other way to call them is as likely [Pitman37]. Nothing is assumed
- * of noise, its tails, or what pixels and channels share: a relabelling moves whole images.
+ * about the noise, its tails, or correlations of pixels and channels: a relabelling moves whole images.
  *
  * Statistic: the largest |t| (two samples, pooled variance) over the squares of sides min_side, 2
  * min_side, .. up to the image, in R, G, B and luminance [Westfall93]. A region's total sum of
@@ -27,8 +27,8 @@ struct permutation {
     enum verdict verdict; /* DIFFERENT: p <= alpha. INCONCLUSIVE: smallest_p > alpha. Else NO
                              DIFFERENCE FOUND */
     char reason[256];
-    double p, smallest_p; /* the second is what so many replicates can reach at best */
-    int num_labellings;   /* compared, with the one observed */
+    double p, smallest_p; /* smallest_p: the lowest that so many replicates can reach */
+    int num_labellings;   /* compared, including the observed one */
     bool is_exhaustive;
     int num_regions; /* over all channels; those that never vary are left out */
     /* Where |t| is largest: */
@@ -46,14 +46,14 @@ NODISCARD bool permutation_test(const struct replicate_dir *a, const struct repl
                                 struct err *e);
 
 /* A second stage on fresh replicates: the region of `first` alone, in its direction, at opt->alpha.
- * Everything in out but mdb, mdb_tile (0) and min_side is of that one test. */
+ * Everything in out is of that one test; mdb and mdb_tile are 0. */
 NODISCARD bool permutation_confirm(const struct permutation *first, const struct replicate_dir *a2,
                                    const struct replicate_dir *b2,
                                    const struct permutation_options *opt, struct permutation *out,
                                    struct err *e);
 
-/* Replicates a side for a smallest p, one- or two-sided, of at most alpha; 0 if random labellings
- * cannot reach it. */
+/* How many replicates a side can reach a p, one- or two-sided (sides: 1 or 2), of at most alpha; 0 if even
+ * random labellings cannot. */
 int permutation_needed(double alpha, int sides);
 
 #endif

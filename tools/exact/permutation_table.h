@@ -1,4 +1,4 @@
-/* The regions of all images of two sides, made comparable: what permutation.c adds up. */
+/* The means of the regions of all images of both sides, standardised, which permutation.c adds up. */
 #ifndef ASSAY_PERMUTATION_TABLE_H
 #define ASSAY_PERMUTATION_TABLE_H
 
@@ -9,10 +9,10 @@
 struct permutation_table {
     int num_a, num_b;
     size_t num;      /* regions of all channels */
-    double sign;     /* 0: of |sum|; else of sum times sign, one-sided */
+    double sign;     /* 0: two-sided, by |sum|; else one-sided, by sum times sign */
     double *z;       /* num_a + num_b rows of num: centred, sum of squares 1, or all 0 */
-    double *mean[2]; /* of A's and B's rows, before that */
-    double *spread;  /* root of the total sum of squares, before that; all in the memory of z */
+    double *mean[2]; /* of A's and B's rows, before they are standardised */
+    double *spread;  /* root of the total sum of squares, likewise. mean and spread lie in the memory of z */
     struct rect *rect;
     int *channel;
 };

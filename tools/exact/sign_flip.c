@@ -19,18 +19,18 @@ struct scan {
     int filter;
     struct windows size[MAX_SIDES];
     int num_sizes;
-    int tile_size; /* of size[]: for mdb_tile; -1: none */
+    int tile_size; /* index into size[], for mdb_tile; -1: none */
     struct sign_flip *out;
 };
 
-/* Of the two-sided bound. */
+/* log10 of the two-sided bound 2 c Q(t). */
 static double log10_normal_bound(double t)
 {
     return fmin(0, stats_t_log10_p(t, INFINITY) + log10(bound_factor));
 }
 
-/* ln of the smallest of the tilted bounds at the l of Newton's search for the tilted mean t; t and s in units of the root of the
- * sum of squares. Each l gives a bound, so the search need not be exact. */
+/* ln of the smallest tilted bound over the l that Newton's search for the tilted mean t visits; t, and s / unit, are in
+ * units of the root of the sum of squares. Every l gives a valid bound, so the search need not be exact. */
 static double log_tilted_bound(const double *s, size_t num, double unit, double t)
 {
     double best = 0, l = t;
@@ -84,7 +84,7 @@ static void list_sizes(const struct sheet *s, const struct sign_flip_options *op
                             side < 8 ? 1 : side / 8, 0, 0};
         w.nx = (s->width - w.width + w.step - 1) / w.step + 1;
         w.ny = (s->height - w.height + w.step - 1) / w.step + 1;
-        /* All signs alike have the chance 2^(1 - n). */
+        /* The smallest p is that of all n signs alike, 2^(1 - n). */
         double coins = (double)s->num * w.width * w.height;
         if ((coins - 1) * log10(2) < log10((double)w.nx * w.ny / opt->alpha) && side < longest)
             continue;
@@ -129,7 +129,7 @@ static void describe(const struct sheet *s, struct rect r, const struct scan *sc
     scan->out->larger = larger / fmax(1, differ);
 }
 
-/* The window with the largest |T| of each size is found by the sums over all pixels, and judged by sums of its own. */
+/* The window of this size with the largest |T| is found by summed-area tables and judged by sums of its own. */
 static void scan_size(struct sheet *s, struct scan *scan, const struct windows *w,
                       enum sign_flip_score score, int channel)
 {
@@ -166,7 +166,7 @@ static void scan_size(struct sheet *s, struct scan *scan, const struct windows *
     describe(s, best, scan);
 }
 
-/* The smallest over the windows. */
+/* The smallest expected T of the windows if the level changes by `change`. */
 static double expected_t(struct sheet *s, const struct windows *w, double change)
 {
     sheet_expect(s, change);

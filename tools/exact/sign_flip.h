@@ -36,9 +36,9 @@ struct sign_flip_images {
 };
 
 struct sign_flip_options {
-    double alpha; /* for mdb, and for what is left out */
+    double alpha; /* for the MDB, and for which sizes of windows are left out */
     int filter_width; /* pixels less than this apart in x and in y may share noise: one in filter_width^2 is judged.
-                         1: all; 0: all, and whether they share noise is looked at */
+                         1: all; 0: all, and a check whether they share noise */
     int tile; /* side, pixels: for mdb_tile */
 };
 
@@ -46,19 +46,19 @@ enum sign_flip_score { SIGN_FLIP_LEVEL, SIGN_FLIP_MEAN, SIGN_FLIP_SPREAD, NUM_SI
 extern const char *const sign_flip_score_name[NUM_SIGN_FLIP_SCORES];
 
 struct sign_flip {
-    double log10_p;    /* of all tests together: the smallest over its share; at most 0 */
+    double log10_p;    /* of all tests together: the smallest p divided by its share; at most 0 */
     int width, height; /* of the images */
     bool
         shares_noise; /* filter_width 0: neighbours look as if they shared noise, and then p means nothing */
     size_t num_tests;  /* windows, channels and scores */
     size_t num_pixels; /* judged, each with a coin for each pair of renders */
-    /* Of the smallest: */
+    /* Of the test with the smallest p: */
     enum sign_flip_score score;
     struct rect rect;
     int channel; /* 0..2 RGB, 3 luminance */
     double t;
     double difference; /* of the means there, over that of B */
-    double larger;     /* of its pixels that differ, the part where A is larger */
+    double larger;     /* share of its differing pixels in which A is larger */
     /* The relative change of the level that is found with about 95 %, of the image and of the worst
      * window of a tile's side; region_mdb_none where none is. To first order. */
     double mdb_global, mdb_tile;

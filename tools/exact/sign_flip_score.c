@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { RADIUS = 4, BLOCK = 8 }; /* of what is local, pixels */
+enum { RADIUS = 4, BLOCK = 8 }; /* pixels: RADIUS of local means; BLOCK of sheet_shares_noise() */
 /* Standard deviation of a normal law over the geometric mean of |x|: e^((ln 2 + gamma)/2). */
 static const double of_geometric_mean = 1.8874;
 const double sheet_lost_digits = 1e-10;
@@ -64,7 +64,7 @@ static void sum_around(struct sheet *s, double *v)
         sum_line(s->work[0] + x, v + x, s->height, w);
 }
 
-/* One channel, in the middles of cells of filter x filter pixels, and its local mean. */
+/* work[1]: the number of values around a pixel. */
 void sheet_load(struct sheet *s, const struct sign_flip_images *in, int filter, int channel)
 {
     for (size_t i = 0; i < s->pixels; i++) {
@@ -105,7 +105,7 @@ static void fill_scale(struct sheet *s, const double *d)
         s->scale[i] = of_geometric_mean * exp(s->scale[i] / fmax(1, s->work[1][i]));
 }
 
-/* Of a difference where the level's score is taken: what it is divided by, and radiance. */
+/* For the level's score at a pixel: the scale that d is divided by, and the radiance. */
 struct unit {
     double scale, mean;
 };
@@ -119,7 +119,7 @@ static struct unit level_unit(const struct sheet *s, size_t v)
                          fabs(s->a[v] + s->b[v]) / 2};
 }
 
-/* By Student's law of 8 degrees of freedom. */
+/* f(x) of sign_flip.h: the score of Student's distribution with 8 degrees of freedom. */
 static double student_score(double x)
 {
     return x / (1 + x * x / 8);
@@ -130,7 +130,7 @@ static double level_score(struct unit u, double d)
     return sqrt(u.mean / u.scale) * student_score(d / u.scale);
 }
 
-/* Of all pairs of each pixel. */
+/* Makes the summed-area tables, over all pairs of each pixel. */
 static void sum_up(struct sheet *s)
 {
     size_t row = (size_t)s->width + 1;
@@ -180,7 +180,7 @@ void sheet_expect(struct sheet *s, double change)
     sum_up(s);
 }
 
-/* Of one pair in the block at x, y. False if it is all difference or all alike. */
+/* Sums of one pair's products in the block at x, y. False if less than a fifth has the other sign, or most are 0. */
 static bool block_products(const struct sheet *s, const double *score, int x, int y, double *sum,
                            double *squares)
 {

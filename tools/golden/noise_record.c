@@ -289,6 +289,17 @@ static enum approval approve_one(const struct approve_options *opt, const struct
     return done;
 }
 
+int noise_record_count(const char *from_dir, const struct suite_scene *scene)
+{
+    struct err e; /* told by noise_record_approve() */
+    json_t *candidate = noise_ladder_load(from_dir, scene->name, &e);
+    int num = 0;
+    for (enum converge_engine k = 0; k < CONVERGE_NUM_ENGINES; k++)
+        num += is_of(scene, k) && json_object_get(candidate, converge_engine_names[k]) != NULL;
+    json_decref(candidate);
+    return num;
+}
+
 void noise_record_approve(const struct approve_options *opt, const struct suite_scene *scene,
                           FILE *out, int count[APPROVE_IMPOSSIBLE + 1], struct err *why)
 {
@@ -314,7 +325,8 @@ void noise_record_approve(const struct approve_options *opt, const struct suite_
     json_decref(all);
 }
 
-size_t noise_record_status(const char *golden_dir, const struct suite_scene *scene, FILE *out)
+size_t noise_record_status(const char *golden_dir, const struct suite_scene *scene, int *total,
+                           FILE *out)
 {
     struct err e = {""};
     json_t *all = noise_ladder_load(golden_dir, scene->name, &e);
@@ -332,7 +344,9 @@ size_t noise_record_status(const char *golden_dir, const struct suite_scene *sce
                 : strncmp(e.msg, "stale", strlen("stale")) == 0 ? "stale"
                                                                 : "damaged",
                 scene->name, engine, current ? "" : ": ", current ? "" : e.msg);
-        bad += !current && (entry != NULL || k < CONVERGE_REFERENCES);
+        bool counts = entry != NULL || k < CONVERGE_REFERENCES;
+        bad += counts && !current;
+        *total += counts;
     }
     json_decref(all);
     return bad;

@@ -278,10 +278,8 @@ static bool judge(const struct carry *w, const struct rubric_check *c, int bugs,
         *is_judged = *is_judged && rubric_bugs_can_observe(w->g, w->with, c->images[k]);
     if (!*is_judged)
         return true;
-    if (c->kind == CHECK_RATES) {
-        grade_checks_rates(w->g, w->with, c, out);
-        return true;
-    }
+    if (c->kind == CHECK_RATES)
+        return grade_checks_rates(w->g, w->with, c, out, e);
     struct cells *cells = calloc(1, sizeof *cells);
     bool ok = cells != NULL || err_set(e, "out of memory");
     for (int k = 0; ok && k < images; k++)
@@ -345,6 +343,11 @@ bool carried_by_name(const struct grading *g, int with, const struct diagnosis *
                      struct result *result, bool paid[RUBRIC_PARTS], struct err *e)
 {
     struct carry w = {.g = g, .with = with};
+    bool lost = false;
+    for (int i = 0; i < g->r->num_checks; i++)
+        lost |= result[i].share != 1;
+    if (!lost) /* the deviations of the diagnosis leave all points, so that nothing was paid */
+        return true;
     find_payer(&w, found, 0, result);
     if (found->candidate[0].second >= 0)
         find_payer(&w, found, 1, result);

@@ -313,7 +313,8 @@ static bool carry_rates(const struct grading *g, int set, const struct rubric_ch
     const struct margin m = margin_of(&c->carried, rates.mean / (1 + rates.more) / p->spp);
     double better = fmin(score_share(&m, &count), score_share(&c->share, &share));
     struct result own = {0};
-    grade_checks_rates(g, set, c, &own);
+    if (!grade_checks_rates(g, set, c, &own, e))
+        return false;
     if (own.share > fmax(better, out->share)) {
         out->share = own.share;
         out->chance = own.chance;

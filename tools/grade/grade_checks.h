@@ -104,9 +104,9 @@ NODISCARD bool grade_checks_run(const struct grading *g, const struct rubric_che
 void grade_checks_growth(const struct grading *g, const struct rubric_check *c, struct result *out);
 
 /* Judges `rates` by the number of samples that the stopping rule takes with the light and the noise of
- * the program's own image; *out stays as it is where that is not known. */
-void grade_checks_rates(const struct grading *g, int set, const struct rubric_check *c,
-                        struct result *out);
+ * the program's own image; *out stays as it is where that is not known. Fails only out of memory. */
+NODISCARD bool grade_checks_rates(const struct grading *g, int set, const struct rubric_check *c,
+                                  struct result *out, struct err *e);
 
 /* All checks, out[0 .. num_checks-1], graded with the set of accepted deviations that leaves the
  * most points. The empty set wins unless another brings more than 1 % of all points and some check of

@@ -62,19 +62,19 @@ bool grade_checks_judge_rates(struct judging *w, struct result *out, struct err 
     return true;
 }
 
-void grade_checks_rates(const struct grading *g, int set, const struct rubric_check *c,
-                        struct result *out)
+bool grade_checks_rates(const struct grading *g, int set, const struct rubric_check *c,
+                        struct result *out, struct err *e)
 {
     int image = c->images[0];
     const struct rubric_image *p = &g->r->image[image];
     struct stopping by[NUM_STOPPING_KINDS];
     struct rate_image rates;
-    struct err why; /* ignored: grade_checks_judge_rates() has reported it */
+    struct err why; /* of the image: grade_checks_judge_rates() has reported it */
     if (!rate_image_read(g->h->made[image].rates, p, c->batch, answer_key_counts(g->a, set, image),
                          &rates, &why) ||
         !stopping_rule_samples(p, &g->h->image[image], answer_key_image(g->a, set, image), by,
                                &why))
-        return;
+        return !err_is_of_memory(&why) || err_set(e, "%s", why.msg);
     double least = by[STOPS_RIGHTLY].least, most = by[STOPS_RIGHTLY].most,
            odd = rates.odd / fmax(1, rates.pixels),
            half = stats_normal_quantile(g->alpha / 2) * rates.sd;
@@ -84,6 +84,7 @@ void grade_checks_rates(const struct grading *g, int set, const struct rubric_ch
                           share = {odd, odd, odd, 0};
     out->share = fmin(score_share(&c->share, &share), score_share(&c->count, &count));
     out->chance = score_chance(&c->count, &count);
+    return true;
 }
 
 /* Seconds by which the CPU times of two runs of the same work may differ. */

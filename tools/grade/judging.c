@@ -155,9 +155,12 @@ bool judging_expect_noise(const struct judging *w, struct err *e)
         double *count = calloc((size_t)s->width * (size_t)s->height, sizeof *count);
         if (count == NULL)
             return err_set(e, "out of memory");
-        if (rate_image_counts(made->rates, p, count, &no_rates))
+        bool known = rate_image_counts(made->rates, p, count, &no_rates);
+        if (known)
             scale_noise(s, count, p->spp);
         free(count);
+        if (!known && err_is_of_memory(&no_rates))
+            return err_set(e, "%s", no_rates.msg);
     }
     return true;
 }

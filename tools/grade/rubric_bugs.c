@@ -152,7 +152,7 @@ static bool expect_mean_over_all(const struct rubric_image *p, const char *rates
             mine->mean[c] = (float)((share - 1) * correct->mean[c]);
     }
     free(count);
-    return true;
+    return known || !err_is_of_memory(&why) || err_set(e, "%s", why.msg);
 }
 
 /* Given the program's own light and noise, the number of samples depends on its stopping rule

@@ -209,7 +209,7 @@ bool stopping_rule_samples(const struct rubric_image *p, const struct submitted_
 {
     size_t tiles = (size_t)(p->width / RUBRIC_TILE) * (size_t)(p->height / RUBRIC_TILE),
            pixels = (size_t)p->width * (size_t)p->height;
-    double *kappa = calloc(2 * tiles, sizeof *kappa), *light = kappa + tiles, sd;
+    double *kappa = calloc(2 * tiles, sizeof *kappa), sd;
     unsigned char *use = malloc(pixels);
     gsl_rng *rng = gsl_rng_alloc(gsl_rng_taus2);
     struct submitted_image right = {0};
@@ -222,10 +222,10 @@ bool stopping_rule_samples(const struct rubric_image *p, const struct submitted_
         struct simulation sim = {.rng = rng,
                                  .image = p,
                                  .m = m,
-                                 .light = light,
+                                 .light = kappa + tiles,
                                  .batch = rubric_option(p, "-a", 0),
                                  .tolerance = rubric_option(p, "-a", 1)};
-        light_of(s, m, light);
+        light_of(s, m, kappa + tiles);
         for (int by = 0; by < NUM_STOPPING_KINDS; by++) {
             sim.by = (enum stopping_kind)by;
             out[by] = (struct stopping){0};

@@ -36,7 +36,8 @@ static bool is_full(const json_t *check)
 static void describe(const json_t *c, char *out, size_t size)
 {
     const char *appeal = member_or_empty(c, "appeal"), *accepted = member_or_empty(c, "accepted"),
-               *hint = member_or_empty(c, "hint"), *where = member_or_empty(c, "where");
+               *hint = member_or_empty(c, "hint"), *where = member_or_empty(c, "where"),
+               *carried = member_or_empty(c, "carried");
     out[0] = '\0';
     if (grade_is_provisional(c))
         text_append(
@@ -47,6 +48,8 @@ static void describe(const json_t *c, char *out, size_t size)
                     member_number(c, "of"));
     text_append(out, size, "Expected: %s.\nSeen: %s.", member_or_empty(c, "expected"),
                 member_or_empty(c, "seen"));
+    if (carried[0] != '\0')
+        text_append(out, size, "\nPaid once: %s", carried);
     if (appeal[0] != '\0')
         text_append(out, size, "\nDecided by staff: %s", appeal);
     if (accepted[0] != '\0')
@@ -68,10 +71,12 @@ static void describe_whole(const json_t *grade, char *out, size_t size)
     const char *located = member_or_empty(grade, "located");
     size_t i;
     json_t *b;
-    snprintf(out, size, "%s%s%s", member_or_empty(grade, "trouble"),
-             member_or_empty(grade, "wrong"),
-             grade_is_provisional(grade) ? "Some points are provisional, until staff have looked.\n"
-                                         : "");
+    const char *why[2] = {member_or_empty(grade, "trouble"), member_or_empty(grade, "wrong")};
+    out[0] = '\0';
+    for (int k = 0; k < 2; k++)
+        text_append(out, size, "%s%s", why[k], why[k][0] != '\0' ? "\n" : "");
+    if (grade_is_provisional(grade))
+        text_append(out, size, "Some points are provisional, until staff have looked.\n");
     if (located[0] != '\0')
         text_append(out, size, "What is wrong shows %s.\n", located);
     else if (strcmp(member_or_empty(diagnosis, "finding"), "unknown") == 0)

@@ -39,7 +39,7 @@ class Scene {
       this.ready = all.every((layer) => layer !== null);
       if (!this.ready) {
         this.box.replaceChildren(make("p", { className: "caption" },
-          "To stay below 5 MB this page has no room for the numbers behind these images."));
+          "To stay below 3 MB this page has no room for the numbers behind these images."));
         this.section.querySelectorAll(".maps .map[data-kind]").forEach((f) => f.remove());
         return;
       }

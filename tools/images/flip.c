@@ -11,7 +11,7 @@
 enum { MAX_TERMS = 2, NUM_CHANNELS = 3 };
 
 /* Contrast sensitivity a exp(-b f^2) at f cycles per degree; its inverse Fourier transform a sqrt(pi/b)
- * exp(-(pi x)^2/b) is what is filtered with. */
+ * exp(-(pi x)^2/b) is the filter's kernel. */
 struct gaussian {
     double a, b;
 };
@@ -58,7 +58,7 @@ static double csf_term_sum(const struct gaussian *g, double ppd)
     return sum;
 }
 
-/* Share of a term in its channel, both axes: what its normalised kernel is weighted with. */
+/* Share of a term in its channel, over both axes: the weight of its normalised kernel. */
 static double csf_share(enum flip_channel channel, int term, double ppd)
 {
     double all = 0, one = 0;
@@ -82,7 +82,7 @@ double flip_csf(enum flip_channel channel, double ppd, int x, int y)
     return w;
 }
 
-/* Of a Gaussian the order-th derivative, weights of each sign summing to 1 (order 0: all of them). */
+/* The order-th derivative of a Gaussian, scaled so that weights of each sign sum to +-1 (order 0: all to 1). */
 static bool make_feature_kernel(int order, double ppd, struct kernel *k)
 {
     double sigma = 0.5 * (double)FEATURE_SIZE * ppd, positive = 0, negative = 0;
@@ -101,7 +101,7 @@ static bool make_feature_kernel(int order, double ppd, struct kernel *k)
     return true;
 }
 
-/* All that images of one size need. */
+/* Kernels and buffers for images of one size. */
 struct flip {
     int width, height;
     size_t pixels;
@@ -109,7 +109,7 @@ struct flip {
     struct kernel csf[NUM_CHANNELS][MAX_TERMS]; /* along one axis; no weights where the term is 0 */
     float share[NUM_CHANNELS][MAX_TERMS];
     struct kernel feature[3]; /* by order */
-    float *line;              /* a row and its continuation on both sides; the rest lies after it */
+    float *line;              /* a padded row; the buffers below follow it in the same memory */
     float *rgb[2], *plane;    /* 3 a pixel; rgb: after filtering, Hunt-adjusted Lab */
     float *edge[2], *point[2], *out, *sum;
 };
@@ -204,7 +204,7 @@ static void filter_columns(const struct flip *f, const struct kernel *k, const f
     }
 }
 
-/* A channel of opponent colours, as the eye resolves it, in place. */
+/* Filters an opponent-colour channel by its contrast sensitivity, in place. */
 static void see_channel(struct flip *f, int channel, float *plane)
 {
     memset(f->sum, 0, f->pixels * sizeof *f->sum);
@@ -221,8 +221,8 @@ static void see_channel(struct flip *f, int channel, float *plane)
     memcpy(plane, f->sum, f->pixels * sizeof *plane);
 }
 
-/* rgb[side] becomes what is seen of it, as Hunt-adjusted Lab. The planes are Y, X - Y and Y - Z relative to white:
- * the opponent space YCxCz less its scales, which linear filters leave alone. */
+/* Filters rgb[side] as the eye does and converts it to Hunt-adjusted Lab. The planes are Y, X - Y and Y - Z relative to
+ * white: the opponent space YCxCz without its scale factors, which do not matter to linear filters. */
 static void see(struct flip *f, int side)
 {
     float *y = f->plane, *cx = y + f->pixels, *cz = cx + f->pixels;
@@ -245,7 +245,7 @@ static void see(struct flip *f, int side)
     }
 }
 
-/* The length of the gradient that a detector of that order sees in Y. */
+/* Magnitude of the order-th derivative of Y: 1 detects edges, 2 points. */
 static void detect(struct flip *f, int order, const float *y, float *out)
 {
     float *rows = f->out, *dy = f->sum;
@@ -260,7 +260,7 @@ static void detect(struct flip *f, int order, const float *y, float *out)
 /* Both rgb[] are filled, in [0, 1]. */
 static void compare(struct flip *f, float *map)
 {
-    /* see() uses an edge plane, so the features come last; Y is kept from before. */
+    /* see() overwrites edge[0] and rgb, so Y is saved first and the features are detected last. */
     float *y[2] = {f->point[0], f->point[1]};
     for (int s = 0; s < 2; s++)
         for (size_t i = 0; i < f->pixels; i++) {

@@ -45,7 +45,7 @@ void flip_lab(const struct flip_colours *c, const float rgb[3], float lab[3])
     lab[2] = 0.01f * lab[0] * 200 * (f[1] - f[2]);
 }
 
-/* HyAB: city block in lightness, Euclid in the rest. */
+/* HyAB distance (city block in lightness, Euclidean in chroma), to the power Q_COLOUR. */
 static float distance(const float a[3], const float b[3])
 {
     return powf(fabsf(a[0] - b[0]) + hypotf(a[1] - b[1], a[2] - b[2]), Q_COLOUR);

@@ -5,7 +5,7 @@
 
 struct flip_colours {
     float to[3][3], from[3][3]; /* RGB to X/Xn, Y/Yn, Z/Zn, white being RGB 1, 1, 1; and back */
-    float largest; /* distance to the power 0.7 of green and blue, the furthest apart of all */
+    float largest; /* HyAB distance to the power 0.7 of green and blue, the largest of all */
 };
 struct flip_colours flip_colours(void);
 

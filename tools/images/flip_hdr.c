@@ -20,7 +20,7 @@ double flip_tone(double x)
     return fmin(y, 1);
 }
 
-/* The radiance that the tone curve shows as t. */
+/* The radiance that the tone curve maps to t. */
 static double tone_inverse(double t)
 {
     double a = aces[0] - t * aces[3], b = aces[1] - t * aces[4], c = aces[2] - t * aces[5];

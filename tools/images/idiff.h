@@ -14,7 +14,7 @@
 #define BLENDER_PERCENT 1.0
 /* The 8-bit sRGB image of the means, 3 bytes a pixel; radiance `white` is 255. */
 void idiff_quantise(const struct moments *m, double white, uint8_t *rgb8);
-/* How many pixels have which largest difference of a channel, in steps of 1/255. */
+/* Histogram over pixels of the largest channel difference, in units of 1/255. */
 void idiff_histogram(const uint8_t *a, const uint8_t *b, size_t pixels, size_t count[256]);
 bool idiff_differs(const size_t count[256], size_t pixels, double fail, double percent);
 /* Percentage of the pixels that fail. */

@@ -14,7 +14,7 @@ static const double octave[STEPS] = {4096, 4340, 4598, 4871, 5161, 5468,
 struct coder {
     const struct moments *m;
     size_t pixels;
-    double *value[3]; /* as the reader will have them */
+    double *value[3]; /* as the decoder will reconstruct them */
     int *noise[3];    /* S */
     uint8_t *plane;   /* where the next plane goes */
     bool slope;
@@ -26,7 +26,7 @@ static unsigned zigzag(int i)
     return i >= 0 ? 2 * (unsigned)i : 2 * (unsigned)-(i + 1) + 1;
 }
 
-/* The lowest bytes of v at element i of as many planes. */
+/* Stores the lowest `bytes` bytes of v at element i of as many planes. */
 static void put(struct coder *c, size_t i, uint32_t v, size_t bytes)
 {
     for (size_t b = 0; b < bytes; b++)
@@ -93,7 +93,8 @@ static double spatial(const struct coder *c, int channel, size_t i)
     return ((v[i - 1] + v[i - w - 1]) + (v[i - w] + v[i - w + 1])) / 4;
 }
 
-/* How far a difference in the channel before goes over into this one. */
+/* r: the factor by which the previous channel's deviation from its prediction is carried over to
+ * this one. */
 static double carry(int noise, int noise_before, double s, double s_before)
 {
     if (noise != 0 && noise_before != 0) {

@@ -29,8 +29,8 @@
 
 #include <stdbool.h>
 
-/* Packs m, to 2^coarser/16 of the standard errors (0: 1/16). *bytes belongs to the caller (free()). *uniform_n: all pixels have the n of the first. Fails
- * only out of memory. */
+/* Packs m with an error of up to 2^coarser/16 of the standard errors. The caller frees *bytes. *uniform_n: all pixels
+ * have the same n. Fails only out of memory. */
 NODISCARD bool pixel_codec_encode(const struct moments *m, int coarser, uint8_t **bytes,
                                   size_t *size, bool *uniform_n, struct err *e);
 

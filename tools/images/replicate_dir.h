@@ -16,7 +16,7 @@ struct replicate_dir {
 NODISCARD bool replicate_dir_read(const char *dir, struct replicate_dir *out, struct err *e);
 void replicate_dir_free(struct replicate_dir *r);
 
-/* Whether image *i of a is image *j of b, bit by bit; of one size. */
+/* Do a and b, of one size, share an image, bit for bit? If so, *i and *j are its numbers. */
 bool replicate_dir_share(const struct replicate_dir *a, const struct replicate_dir *b, int *i,
                          int *j);
 

@@ -1,4 +1,4 @@
-/* Tone curves of 8 and 16-bit images, backwards: from a code to linear radiance. */
+/* Inverse tone curves of 8-bit and 16-bit images: from a code to linear radiance. */
 #ifndef ASSAY_TONE_CURVE_H
 #define ASSAY_TONE_CURVE_H
 
@@ -13,10 +13,10 @@ struct curve {
  * L)^(1/2.2), cut off to the step below). The others are taken to be rounded to the nearest step. */
 NODISCARD bool tone_curve_parse(const char *text, struct curve *out, struct err *e);
 
-/* Radiance of a code of 0 .. 1. Rises strictly. */
+/* The radiance of a code in [0, 1]; strictly increasing. */
 double tone_curve_decode(const struct curve *c, double code);
 
-/* What code `k` of 0 .. steps can stand for, dithering none: all from *lo to *hi, as if evenly. */
+/* The interval [*lo, *hi] of radiance that code k of 0 .. steps stands for, if the image is not dithered. */
 void tone_curve_bin(const struct curve *c, int k, int steps, double *lo, double *hi);
 
 #endif

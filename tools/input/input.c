@@ -37,7 +37,7 @@ static bool is_moments(const struct image *im)
     return image_channel(im, "M2.R") >= 0;
 }
 
-/* Ours are told by their header, and OpenImageIO stays where it is. Fails only out of memory: then that could not be had either. */
+/* Recognises our moments by the header, without loading OpenImageIO. Fails only out of memory. */
 static bool look_for_moments(const char *path, bool *says, struct err *e)
 {
     struct image head;
@@ -142,7 +142,7 @@ void input_free(struct input *in)
     *in = (struct input){0};
 }
 
-/* Both sides get the union, and in it the same number without noise. */
+/* Both sides get the union of the censored pixels, in which both become 0 without noise. */
 static bool censor(struct input *a, struct input *b, struct notes *notes, struct err *e)
 {
     if (a->censored == NULL && b->censored == NULL)
@@ -207,7 +207,7 @@ static bool pair_images(struct input *a, struct input *b, struct notes *notes, s
     return true;
 }
 
-/* Nothing of it will be changed. */
+/* Does input_pair() have nothing to change in it? */
 static bool is_ready(const struct input *in)
 {
     return (in->kind == INPUT_MOMENTS || in->kind == INPUT_REPLICATES) && !in->is_xyz &&

@@ -2,7 +2,7 @@
  *   a moments EXR; a directory of replicates; the output of Mitsuba 3's moment integrator, or its
  *   reference with a variance image beside it; a plain image: EXR, HDR, PFM of floats; a PNG of
  *   known tone curve.
- * What has been assumed on the way is told in notes, which belong beside every verdict. */
+ * Assumptions made on the way are reported in notes, which must be shown with every verdict. */
 #ifndef ASSAY_INPUT_H
 #define ASSAY_INPUT_H
 
@@ -14,7 +14,7 @@ struct notes {
     int num;
     char line[16][320];
 };
-/* One more note; the same text twice is one note. */
+/* Adds a note, unless the same text is there already or there is no room. */
 void input_notes_add(struct notes *notes, const char *format, ...)
     __attribute__((format(printf, 2, 3)));
 
@@ -60,9 +60,9 @@ NODISCARD bool input_take(const struct input_memory *memory, const char *name, c
                           struct err *e);
 void input_free(struct input *in);
 
-/* Makes both fit for compare_moments(), packed or not: the same colour space, censored pixels out of both (0, exact,
- * whatever they were), skewness bounded where it is not known, and variance from the images
- * themselves if one of them has none. */
+/* Prepares both for compare_moments(), packed or not: converts to one colour space, sets censored pixels to 0 without
+ * noise in both, bounds skewness where it is not known, and estimates the variance from the images themselves if
+ * one of them has none. */
 NODISCARD bool input_pair(struct input *a, struct input *b, struct notes *notes, struct err *e);
 
 /* After compare_moments() on a pair: EQUIVALENT and NO DIFFERENCE FOUND become INCONCLUSIVE, with the reason, if more than

@@ -1,15 +1,15 @@
-/* The kinds of input.h, one function each. `out` is zeroed before. */
+/* One function for each kind of input. The caller has zeroed `out`. */
 #ifndef ASSAY_INPUT_INTERNAL_H
 #define ASSAY_INPUT_INTERNAL_H
 
 #include "renderer/image/image_oiio.h"
 #include "input.h"
 
-/* Tells where the file holds another rectangle than the image. */
+/* Adds a note if the file stores a rectangle other than the whole image. */
 void input_note_crop(struct notes *notes, const char *path, const struct image_info *info);
 
-/* Mitsuba 3 (input_mitsuba.c). *is_it: whether the file is such a one at all; false and no error if
- * not. `im` is the file. */
+/* Mitsuba 3 (input_mitsuba.c). *is_it: whether the file is one of Mitsuba's at all; if not, returns
+ * true and leaves `out` as it is. `im`: the file's content. */
 NODISCARD bool input_mitsuba(const char *path, char side, const struct image *im,
                              const struct image_info *info, const struct input_options *opt,
                              struct input *out, bool *is_it, struct notes *notes, struct err *e);
@@ -19,7 +19,7 @@ void input_to_xyz(struct input *in);
 /* Images without moments (plain_image.c). */
 NODISCARD bool plain_image_input(const char *path, char side, const struct input_options *opt,
                                  struct input *out, struct notes *notes, struct err *e);
-/* The same of one that is read; `path` is for messages. */
+/* The same for an image that has been read; `path` is for messages. */
 NODISCARD bool plain_image_take(const char *path, char side, const struct image_file *pic,
                                 const struct input_options *opt, struct input *out,
                                 struct notes *notes, struct err *e);

@@ -1,7 +1,7 @@
 /* Mitsuba 3, as its sources have it:
  *   src/integrators/moment.cpp: channels NAME.X, NAME.Y, NAME.Z (CIE XYZ of a sample of the nested
  *   integrator NAME) and m2_NAME.X .. (of its square), both averaged by the film over all samples, so
- *   that m2 - mean^2 is the variance of one sample with n, not n - 1, below it.
+ *   that m2 - mean^2 is the variance of one sample with the divisor n, not n - 1.
  *   src/render/tests/test_renders.py: a reference NAME.exr and NAME_var.exr beside it, the second
  *   being that variance of X, Y, Z written through the XYZ to RGB matrix as if it were a colour.
  * Neither file says how many samples there were. pbrt's Variance.* channels are refused: they leave
@@ -23,8 +23,8 @@ static void matrix(const double in[3], double out[3])
         out[i] = xyz_of_rgb[i][0] * in[0] + xyz_of_rgb[i][1] * in[1] + xyz_of_rgb[i][2] * in[2];
 }
 
-/* f(x) applied to the three, multiplied, and g applied: a bound for g(X) if all channels move
- * together. */
+/* v becomes (matrix f(v))^power: of moments, with f the root of that power, a bound for any correlation
+ * of the channels, which is reached if they are fully correlated. */
 static void through(double *v, double (*f)(double), double power)
 {
     double in[3] = {f(v[0]), f(v[1]), f(v[2])}, out[3];
@@ -68,8 +68,8 @@ static bool needs(const char *path, char side, const struct image_info *info,
     return true;
 }
 
-/* Mean and variance of X, Y, Z of one pixel; scale: of the numbers that the variance is a difference of. *below
- * counts what rounding has left below 0. */
+/* Mean and variance of X, Y, Z of one pixel; scale: size of the numbers whose difference the variance is.
+ * *below counts variances that rounding has made negative. */
 static bool set_pixel(const char *path, struct moments *m, size_t p, const double mean[3],
                       const double variance[3], const double scale[3], double spp, size_t *below,
                       struct err *e)

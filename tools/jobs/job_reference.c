@@ -198,8 +198,8 @@ static const char **artefacts(const struct plan *p, int first, int num, struct e
         return NULL;
     }
     const char **dir = malloc((size_t)num * (sizeof *dir + sizeof(struct path)));
-    struct path *path = (struct path *)(void *)(dir + num);
     bool ok = dir != NULL || err_set(e, "out of memory");
+    struct path *path = ok ? (struct path *)(void *)(dir + num) : NULL;
     for (int i = 0; ok && i < num; i++) {
         path[i] = job_run_artefact(p, first + i, NULL);
         dir[i] = path[i].s;

@@ -192,6 +192,8 @@ bool assay_compare_again(const struct assay_side *a, const struct assay_side *b,
     struct assay_comparison *c = calloc(1, sizeof *c);
     struct err e = {""};
     bool ok = c != NULL || err_set(&e, "out of memory");
+    ok = ok && ((a2 == NULL) == (b2 == NULL) ||
+                err_set(&e, "the second stage needs fresh images of both sides, or of none"));
     if (ok && a2 != NULL) /* for the rules between options */
         c->job.again[0] = c->job.again[1] = "";
     ok = ok && job_of(options, c, &e) && run(c, side, &e);

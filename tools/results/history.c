@@ -75,7 +75,8 @@ static struct history_point point_of(const json_t *claim, size_t run)
 {
     struct history_point p = {
         .run = run,
-        .alpha = member_number(claim, "alpha"),
+        /* Two stages: the interval is of half of it. */
+        .alpha = member_number(claim, "alpha") / fmax(1, member_number(claim, "stages")),
         .difference = member_number(claim, "difference"),
         .low = member_end(claim, "ci", 0),
         .high = member_end(claim, "ci", 1),

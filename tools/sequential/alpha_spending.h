@@ -34,8 +34,8 @@ struct alpha_spending {
 extern const struct alpha_spending alpha_spending_single, alpha_spending_declared,
     alpha_spending_open;
 
-/* Observations at a look of a side of which `declared` are declared; 0 if there would be fewer than
- * `least`, of which no error rate was measured. The declared number itself is always a look. */
+/* The number of observations of a side at a look, if `declared` are declared; 0 if that is fewer than
+ * `least`, for which no error rates were measured. From LOOK_DECLARED on it is never 0; at most 2^24. */
 int alpha_spending_count(int look, int declared, int least);
 
 /* The observations so far of A and B at this look: stage 0, or stage 1 of fresh seeds (exact sides are

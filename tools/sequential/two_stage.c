@@ -36,8 +36,8 @@ bool two_stage_first(const struct moments *a, const struct moments *b,
     comparison_free(out);
     if (!compare_moments(a, b, &half, out, e))
         return false;
-    /* Stricter, yet over fewer tests where skewness forbids most of them: not flagged, so not
-     * DIFFERENT, but no pass either. */
+    /* alpha/2 is stricter, but skewness may leave fewer tests to divide it among: what was not
+     * flagged is not DIFFERENT then, but does not pass either. */
     if (out->verdict == VERDICT_DIFFERENT)
         out->verdict = VERDICT_INCONCLUSIVE;
     return true;
@@ -51,7 +51,7 @@ static struct cell cell_of(const struct moments *a, const struct moments *b, str
     for (int y = r.y; y < r.y + r.height; y++)
         for (int x = r.x; x < r.x + r.width; x++) {
             size_t p = (size_t)y * (size_t)a->width + (size_t)x;
-            struct estimate ea = pyramid_pixel_estimate(a, p, channel),
+            struct pixel_estimate ea = pyramid_pixel_estimate(a, p, channel),
                             eb = pyramid_pixel_estimate(b, p, channel);
             pyramid_add_pixel(&sum, &ea, &eb);
         }
@@ -115,8 +115,8 @@ bool two_stage_confirm(const struct comparison *first, const struct moments *a2,
                  100 * difference);
         confirmed = log10_p <= log10(level);
     }
-    /* Of the others the same test must have the smallest p again; that p stands for either sign and
-     * is held against all tests of the statistic, so nothing is lost but power. */
+    /* In the other statistics the same test must have the smallest p again; that p is two-sided and
+     * corrected for all tests of the statistic, so nothing is lost but power. */
     for (int s = STATISTIC_PYRAMID + 1; s < NUM_STATISTICS && !confirmed; s++) {
         if (!verdict_rejects(first, s, stage))
             continue;

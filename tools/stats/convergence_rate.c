@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The darkest unit, as a share of the reference's mean; as in compare.c. */
+/* The darkest unit, as a share of the reference's mean; as in input_checks.c. */
 #define DARK_SHARE 0.05
 
 void convergence_rate_reference_free(struct converge_reference *r)
@@ -192,7 +192,7 @@ static bool estimate_rung(const struct sums *s, int count, const struct converge
     }
     out->log_mse = with_variance(log(mse), jackknife_se(without, count), count, more / (mse * mse));
 
-    /* |sum of x_k - r|^2 = K^2 |m - r|^2, and less one of them by the binomial formula. */
+    /* |sum of x_k - r|^2 = K^2 |m - r|^2; without one of them, by the binomial formula. */
     double all = K * K * s->mean_to_ref;
     for (int k = 0; k < count; k++) {
         double pairs = all - 2 * K * s->along[k] + s->to_ref[k] - (to_ref - s->to_ref[k]);
@@ -221,7 +221,7 @@ bool convergence_rate_rung(const float *images, int count, double spp,
     return ok;
 }
 
-/* What the slope takes of rung i's logarithm. */
+/* The coefficient of rung i's ln MSE in the slope. */
 static double slope_coefficient(const struct rung *rung, int num, int i)
 {
     double mean_v = 0, sw = 0, sx = 0, sxx = 0;

@@ -67,7 +67,7 @@ NODISCARD bool convergence_rate_rung(const float *images, int count, double spp,
  * freedom are the smallest of any rung, not the larger number that their sum would have: squared errors are
  * skewed, and that makes up for it (tests/tools/stats/test_converge.c). */
 struct estimate convergence_rate_slope(const struct rung *rung, int num);
-/* The degrees of freedom that its sum has [Satterthwaite46], where those of rungs are cautious themselves
+/* The slope's degrees of freedom as a sum [Satterthwaite46], for rungs whose own are conservative already
  * (variance_ladder.h). */
 double convergence_rate_slope_dof(const struct rung *rung, int num);
 
@@ -85,7 +85,7 @@ enum verdict convergence_rate_floor_verdict(const struct rung *r, double margin,
 struct estimate convergence_rate_log_ratio(const struct rung *a, const struct rung *b);
 
 /* CPU seconds of a replicate = start + per_spp x spp, by least squares of the relative residuals over num
- * >= 2 rungs: the start of the engine is not held against it. */
+ * >= 2 rungs, so that the engine's start-up time can be left out. */
 struct cost {
     double start_s;
     struct estimate per_spp; /* se is INFINITY with two rungs */

@@ -9,10 +9,10 @@
 enum { BLOCK = 8, FEWEST = 16 };
 static const double tail_factor = 4;    /* Var(sum r^2) / sum r^4 */
 static const double skew_factor = 6;    /* 1 / sum of the kernel cubed */
-static const double most_sd = 2.5;      /* of D where only its level is asked */
+static const double most_sd = 2.5;      /* at which D is clipped for its level */
 static const double level_error = 1e-3; /* chance that the level is still too low */
-/* Of the factor with the side: from where on larger squares are asked, and still larger ones. It is 4 while a square
- * holds hardly more than one value. */
+/* Growth of the factor from one side to twice that: above `rising` larger squares are used, above `steep` still larger
+ * ones; `unbounded` caps it. It is 4 while a square holds hardly more than one independent value. */
 static const double rising = 1.5, steep = 2.5, unbounded = 3.8;
 /* 2 / relative variance of the median of n squared differences of neighbours in a grid of independent normal values:
  * between 0.236 and 0.246 n in simulations of grids of 6 x 4 to 32 x 24 */
@@ -76,7 +76,7 @@ struct blocks {
     int nx, ny;
     struct block *b;
     double *v,
-        *m4; /* mean r^2 and r^4 of the block, or of the blocks around it too if it has few */
+        *m4; /* mean r^2 and r^4 of the block, with its neighbours if it has too few values */
 };
 
 static void blocks_free(struct blocks *g)
@@ -125,8 +125,8 @@ static bool blocks_make(const struct grid *d, struct blocks *g, struct err *e)
     return true;
 }
 
-/* Mean of D over the blocks around one, which follows what the images differ by, and 1.25 times the
- * mean distance from it, the sd of a normal law. */
+/* Mean of D over 3 x 3 blocks, which follows a smooth difference of the images, and sqrt(pi/2) times the
+ * mean absolute deviation from it, which is the sd of a normal distribution. */
 static void local_scale(const struct grid *d, int bx, int by, double *mean, double *sd)
 {
     for (int pass = 0; pass < 2; pass++) {
@@ -142,7 +142,7 @@ static void local_scale(const struct grid *d, int bx, int by, double *mean, doub
     *sd *= sqrt(M_PI / 2);
 }
 
-/* D less its local mean, cut at +-most_sd: independent if D is, and without the tails that would leave
+/* (D - local mean)/sd, clipped at +-most_sd: independent if D is, and without the tails that would leave
  * few degrees of freedom. NAN where nothing varies. */
 static void clip(const struct grid *d, struct grid *out)
 {
@@ -174,7 +174,7 @@ static bool bin_means(const struct grid *d, int side, struct grid *bins, struct 
     return true;
 }
 
-/* Mean variance of the blocks in which one square of a side lies. */
+/* Mean variance of the blocks that square (x, y) of this side overlaps. */
 static double blocks_under(const struct blocks *g, int side, int x, int y)
 {
     double sum = 0;
@@ -185,9 +185,9 @@ static double blocks_under(const struct blocks *g, int side, int x, int y)
     return sum / num;
 }
 
-/* Variance of the means of squares of a side over that of independent pixels, and its degrees of freedom: by the median
- * of the squared differences of neighbours, as few squares are left and a region in which the images differ may hold
- * many of them. dof 0: too few. */
+/* Variance of means over squares of this side, over that of independent pixels, and its degrees of freedom (0: too few
+ * squares). From the median of squared differences of neighbouring squares, as few squares are left and many may lie in
+ * a region in which the images differ. */
 static bool coarse(const struct grid *d, const struct blocks *g, int side, double *factor,
                    double *dof, struct err *e)
 {
@@ -226,9 +226,10 @@ static bool tell_too_few(struct err *e)
     return err_set(e, "too few pixels vary or are not saturated to tell their noise");
 }
 
-/* How much more variance means of squares have than if pixels were independent, and an upper bound of that of ever larger
- * squares: by chi-square with the degrees of freedom that the sums of squares leave, and by as much again as from half
- * the side, as it nears its limit like 1/side, or more where it rises steeply. The side is 4, or larger while it does. */
+/* *factor: variance of means over squares, over that of independent pixels; *bound: an upper bound of it for
+ * arbitrarily large squares: the chi-square limit with the degrees of freedom of the sums of squares, plus the increase
+ * from half the side once more, as the factor approaches its limit like 1/side, or more if it rises steeply. The side
+ * is 4, or larger while the factor rises. */
 static bool level(const struct grid *d, const struct blocks *blocks, double *factor, double *bound,
                   struct err *e)
 {
@@ -274,7 +275,7 @@ static bool level(const struct grid *d, const struct blocks *blocks, double *fac
     return ok;
 }
 
-/* Mean of (r/sd)^3 over the image; the error from the scatter of the blocks' sums. */
+/* Skewness of D, from the mean of (r/sd)^3 over the image, and its standard error, from the scatter of blocks' sums. */
 static void skewness(const struct blocks *g, double *skew, double *error)
 {
     size_t blocks = (size_t)g->nx * (size_t)g->ny;
@@ -295,7 +296,7 @@ static void skewness(const struct blocks *g, double *skew, double *error)
     *error = skew_factor * sqrt(scatter) / num;
 }
 
-/* Writes one side's pixel so that compare.c reads v for its variance and k3 for its third cumulant:
+/* Writes one side's pixel so that pyramid.c finds the variance v and the third cumulant k3:
  * n = 3, M2 = v n (n-1), M3 = k3 n (n-1)(n-2). */
 static void set_pixel(struct moments *m, size_t i, double v, double k3)
 {
@@ -303,8 +304,8 @@ static void set_pixel(struct moments *m, size_t i, double v, double k3)
     m->m3[i] = 6 * k3;
 }
 
-/* compare.c takes the variance of v as k3^2/v: a third cumulant s on both sides, which cancels in the
- * difference, says tail_factor m4 for v/2 + v/2, as 2 s^2/(v/2) = 4 m4. */
+/* pyramid_estimate_from() takes k3^2/v for the variance of v: a third cumulant s on both sides, which cancels in the
+ * difference, makes that of v/2 + v/2 tail_factor m4, as 2 s^2/(v/2) = 4 m4. */
 static void set_channel(struct moments *a, struct moments *b, int c, const struct blocks *g,
                         double bound, double skew, const double *more_a, const double *more_b,
                         const unsigned char *censored)

@@ -8,7 +8,7 @@ static bool is_near(double x, double y, double tolerance)
     return fabs(x - y) <= tolerance;
 }
 
-/* The first of its numbers that differs, NULL: none. */
+/* The name of the first number of pixel p that differs, with both values; NULL: none. */
 static const char *differs(const struct moments *a, const struct moments *b, size_t p,
                            double value[2])
 {

@@ -1,11 +1,11 @@
-/* Does a renderer waste samples? What it states of its noise is held against the closed form of the noise
- * that its estimator has (reference/truth/truth_noise.h), for the samples that it was asked for:
+/* Does a renderer waste samples? The noise that it states is compared with the closed form of its estimator's
+ * noise (reference/truth/truth_noise.h) for the number of samples that was asked for:
  *
  *   ratio = spp sum var(mean) / sum V
  *
  * var(mean) = M2/(n(n-1)) as stated, V the variance of one sample, sums over pixels and channels. 1 for a
- * renderer that takes all its samples and takes them as it says; 2 where every other sample is skipped
- * or thrown away. Whether the statement itself holds is asked by stated_error.h. */
+ * renderer that takes all its samples by its documented estimator; 2 if every other sample is skipped or
+ * thrown away. Whether the statement itself holds is asked by stated_error.h. */
 #ifndef ASSAY_SAMPLE_EFFICIENCY_H
 #define ASSAY_SAMPLE_EFFICIENCY_H
 

@@ -41,7 +41,8 @@ static struct totals sum(const struct moments *m)
     return t;
 }
 
-/* sum over pixels and channels of var_k x_k(p) without render `out` (num: with all). */
+/* Sum over pixels and channels of var_k x_k(p), without render number `out` (num: with all
+ * renders). */
 static double variance_between(const struct moments *render, int num, int out)
 {
     size_t values = 3 * (size_t)render[0].width * (size_t)render[0].height;
@@ -58,7 +59,7 @@ static double variance_between(const struct moments *render, int num, int out)
     return sum;
 }
 
-/* ln R without render `out` (num: with all). */
+/* ln R without render number `out` (num: with all renders). */
 static double log_ratio(const struct moments *render, const struct totals *t, int num, int out)
 {
     double stated = 0;
@@ -98,7 +99,7 @@ static bool judge_pixels(const struct moments *render, const struct totals *t, i
     return true;
 }
 
-/* Keeps the channel whose S is furthest out, by its p. */
+/* Keeps S of the channel with the smallest p, and the range that is expected of S. */
 static void judge_image(const struct totals *t, int num, double alpha, struct stated_error *out)
 {
     double smallest = 1;

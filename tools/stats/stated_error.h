@@ -1,6 +1,6 @@
 /* Does a renderer's stated error hold? K >= 4 renders of one scene with seeds of their own, each with the
- * moments of its samples, are held against each other: what they say of their own error (the spread of
- * samples within a render) against the error that they have (the spread between renders).
+ * moments of its samples, are compared: the error that they state (from the spread of samples within a
+ * render) with the error that they have (the spread between renders).
  *
  * Means cannot show this: a renderer whose pixels share random numbers, whose samples repeat, or whose
  * seed does nothing has the right mean. With x_k(p) the mean of render k in pixel p and channel, s2_k(p) =
@@ -27,8 +27,8 @@ struct stated_error {
     int renders;
     double pixels, pixels_lo, pixels_hi; /* R and its 1 - alpha interval */
     double image, image_lo,
-        image_hi; /* of S of the channel furthest from 1; where independent pixels
-                                            put it with 1 - alpha/3 */
+        image_hi; /* S of the channel furthest from 1, and the 1 - alpha/3 range of
+                                            S for independent pixels */
 };
 
 /* margin: R may lie in [1/(1 + margin), 1 + margin]. DIFFERENT if the interval of R lies outside, if S

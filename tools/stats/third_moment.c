@@ -5,15 +5,15 @@
 #include <string.h>
 
 enum { REACH = 8, FEWEST = 16 };
-/* Variance of a sum of products of second differences over the sum of their squares, 3.78: their correlations with
- * those beside them, 1, -2/3 and 1/6 a direction, squared and summed. */
+/* Variance of a sum of products of second differences over the sum of their squares, 3.78, rounded up: the sum of the
+ * squared correlations with neighbours, which are 1, -2/3 and 1/6 per direction. */
 static const double overlap = 4;
-static const double num_errors = 1; /* standard errors on top */
+static const double num_errors = 1; /* standard errors that are added */
 
 /* One channel: A - B, the variances of the two means, and second differences. */
 struct field {
     int width, height;
-    double *d, *v[2], *product; /* of those of A - B and of the sum of the variances */
+    double *d, *v[2], *product; /* product: of second differences, of d and of v[0] + v[1] */
 };
 
 /* What a window holds. */
@@ -126,8 +126,8 @@ static struct sums window_at(const struct field *f, int x, int reach, const stru
     return sum;
 }
 
-/* Sets *part, of (vA + vB)^1.5, to which |k3A - k3B| is bounded, and *root to the standard deviation of vA + vB over it. No
- * bound is lower than the standard error of third moments observed n times a pixel, for a normal law. */
+/* *part: the bound of |k3A - k3B| over (vA + vB)^1.5; *root: the standard deviation of vA + vB over vA + vB. No bound
+ * is lower than the standard error of third moments of n observations per pixel for a normal distribution. */
 static void bound(const struct sums *window, const struct sums *own, double n, double *part,
                   double *root)
 {
@@ -152,7 +152,8 @@ static double third(const struct moments *m, size_t p, int c)
     return strcmp(m->unit, "exact") == 0 ? 0 : m->m3[3 * p + (size_t)c] / (n * (n - 1) * (n - 2));
 }
 
-/* compare.c takes the variance of v for k3^2/v: what is added to both sides cancels in k3A - k3B and says the rest of it. */
+/* pyramid_estimate_from() takes k3^2/v for the variance of v: what is added to both k3 cancels in k3A - k3B and
+ * supplies the rest of that. */
 static void set_pixel(const struct field *f, struct moments *a, struct moments *b, bool lacks_a,
                       bool lacks_b, size_t p, int c, double part, double root)
 {

@@ -24,7 +24,7 @@ int variance_map_tile(const struct variance_map *m, int x, int y, int side)
            (x < m->tiles_x ? x : m->tiles_x - 1);
 }
 
-/* Of an area: number of pixels, sums of V_p, of its variance and of that squared. */
+/* Sums over an area: number of pixels, V_p, its variance w_p, and w_p squared. */
 struct area {
     double pixels, v, w, ww;
 };
@@ -84,7 +84,7 @@ static void areas_end(struct areas *a, struct variance_map *out)
     free(a->tile);
 }
 
-/* Of the d of a pixel: their mean, and sum (d - mean)^2. */
+/* The mean of the d of a pixel; returns sum (d - mean)^2. */
 static double scatter(const double *d, int count, double *mean)
 {
     double sum = 0;
@@ -96,7 +96,7 @@ static double scatter(const double *d, int count, double *mean)
     return sum;
 }
 
-/* Some are the same, and some are not. */
+/* Fails if some images are the same and others are not. */
 static bool check_seeds(const float *images, int count, size_t size, struct err *e)
 {
     int same = 0, other = 0;
@@ -141,8 +141,8 @@ bool variance_ladder_between(const float *images, int count, const struct conver
     return ok;
 }
 
-/* No samples below 0 have E[x^3] E[x] < E[x^2]^2 [Cauchy-Schwarz]; equal where all are 0 or one value. Files hold 32-bit floats,
- * in which the cubes of what is darker than 1e-12 are 0. */
+/* Non-negative samples have E[x^3] E[x] >= E[x^2]^2 [Cauchy-Schwarz], with equality if all are 0 or one value. Files
+ * hold 32-bit floats, in which the cubes of values below 1e-12 vanish. */
 static bool check_third(const struct moments *m, size_t i, struct err *e)
 {
     static const double rounding = 1e-3, darkest = 1e-24;

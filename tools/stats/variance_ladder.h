@@ -17,10 +17,10 @@
 
 #include "convergence_rate.h"
 
-/* A variance up to this is rounding of float32, not noise: 1e-5 of the value, as compare.c has it. */
+/* A relative variance up to this, 1e-6 (0.1 % of the value), counts as rounding of float32, not noise. */
 extern const double variance_ladder_none;
 
-/* Tiles as of reports: what is left of one at the border is one of its own from half a tile on. */
+/* Tiles as in reports: what is left at the border is a tile of its own if it is half a tile or more. */
 struct variance_map {
     int tiles_x, tiles_y;
     struct estimate image, *tile; /* V itself, not its logarithm */
@@ -29,13 +29,13 @@ void variance_map_free(struct variance_map *m);
 /* The tile of pixel (x, y). */
 int variance_map_tile(const struct variance_map *m, int x, int y, int side);
 
-/* K images one after the other, rows of `width` pixels (of unit->size / 3). Fails where two are the same bit by bit
- * and yet not all are: a seed without effect. */
+/* K consecutive images of unit->size / 3 pixels, `width` per row. Fails if some of them, but not all, are the same bit
+ * for bit: a seed without effect. The caller calls variance_map_free(). */
 NODISCARD bool variance_ladder_between(const float *images, int count,
                                        const struct converge_reference *unit, int width, int tile,
                                        struct variance_map *out, struct err *e);
-/* K renders of unit "sample"; fails where a pixel holds fewer than two, or an M3 that no samples of
- * 0 and more can have. */
+/* K >= 2 renders of unit "sample"; fails if a pixel has fewer than two samples or an M3 that is impossible for
+ * non-negative samples. */
 NODISCARD bool variance_ladder_within(const struct moments *render, int count,
                                       const struct converge_reference *unit, int tile,
                                       struct variance_map *out, struct err *e);
@@ -49,20 +49,22 @@ struct variance_claim {
     double ratio, lo, hi; /* V over what it should be, and its interval at 1 - 2 alpha */
     double margin;
 };
-/* Half width of the interval of a difference to a record that was estimated like this, when `share` (0 to 1) of its
- * observations are taken again, at an alpha of 1e-6, and how far chance moves that in 1 of 1e6 runs. */
+/* How far an unchanged variance may seem to be from a record with this estimate if `share` (0 to 1) of the record's
+ * observations are taken again: the half width of the difference's interval at an alpha of 1e-6, plus the deviation
+ * that chance exceeds in 1 of 1e6 runs. */
 double variance_ladder_reach(struct estimate record, double share);
-/* The margin that can be had against a record of this V: `least`, or what it reaches, at most 300 %. */
+/* The margin that is attainable against a record of this V: by variance_ladder_reach(), at least `least`, at most 300
+ * %. */
 double variance_ladder_margin(struct estimate record, double share, double least);
-/* An estimate of a run of the same engine: with the degrees of freedom that the record makes
- * expect, if they are more. One firefly in a run makes its standard error large and its own degrees
- * of freedom few, one too often of the two. */
+/* A run's estimate of the same engine, with the degrees of freedom that the record lets us expect if
+ * those are more: a firefly in a run enlarges its standard error and also reduces its own degrees of
+ * freedom, and so would count twice. */
 struct estimate variance_ladder_expect(struct estimate run, struct estimate record, double share);
 
 /* Two one-sided tests at alpha of V / wanted <= 1 + margin; if `both`, of >= 1/(1 + margin) too.
  * DIFFERENT if the interval lies outside, EQUIVALENT if inside, else INCONCLUSIVE, or, at the
- * largest margin, NO DIFFERENCE FOUND: more could not be promised. A `wanted` without noise wants
- * none: then ratio is V itself, the margin variance_ladder_none. */
+ * largest margin, NO DIFFERENCE FOUND: no better margin was attainable. If `wanted` has no noise, V must have
+ * none: then ratio is V itself, and the margin is variance_ladder_none. */
 struct variance_claim variance_ladder_judge(struct estimate v, struct estimate wanted,
                                             double margin, bool both, double alpha);
 

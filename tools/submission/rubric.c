@@ -21,6 +21,8 @@ struct statement {
     struct rubric_image *image; /* the block that the line stands in; at most one is not NULL */
     struct rubric_check *check;
     bool varies; /* a statement with {variant} was read */
+    /* Numbers and images given so far, a bit for each row of the table: of the rubric, of the block. */
+    uint32_t given[2];
 };
 
 static char *take_word(struct statement *s)
@@ -177,6 +179,7 @@ static bool begin(struct statement *s, const char *what, int num, int most)
 {
     s->check = NULL;
     s->image = NULL;
+    s->given[1] = 0;
     if (num == most)
         rubric_mistake(s->m, s->line, "more than %d %s", most, what);
     return num < most;
@@ -269,6 +272,8 @@ static void read_check(struct statement *s)
 
 static void read_size(struct statement *s)
 {
+    if (s->image->width > 0)
+        rubric_mistake(s->m, s->line, "a second 'size'");
     take_int(s, "size", 16, 4096, &s->image->width);
     take_int(s, "size", 16, 4096, &s->image->height);
 }
@@ -401,11 +406,15 @@ static const struct member of_check[] = {{"image", MARGIN, TO(rubric_check, imag
 /* False: none of these statements. */
 static bool read_member(struct statement *s, const struct member *m, void *object, const char *word)
 {
-    while (m->word != NULL && strcmp(m->word, word) != 0)
-        m++;
+    uint32_t row = 1, *given = &s->given[object != s->r];
+    for (; m->word != NULL && strcmp(m->word, word) != 0; m++)
+        row <<= 1;
     if (object == NULL || m->word == NULL)
         return false;
     void *to = (char *)object + m->at;
+    if (m->read == NULL && m->value != TEXT && *given & row)
+        rubric_mistake(s->m, s->line, "a second '%s'", word);
+    *given |= row;
     if (m->read != NULL)
         m->read(s);
     else if (m->value == TEXT)

@@ -229,7 +229,7 @@ static bool collect(const struct suite *suite, struct traits *t, struct err *e)
         bool differs = is_verdict(c, "verdict", VERDICT_DIFFERENT);
         if (s == NULL || a == NULL || !is_verdict(c, "expected", VERDICT_EQUIVALENT) ||
             (!differs && !is_verdict(c, "verdict", VERDICT_EQUIVALENT)) ||
-            strncmp(a, program, length) != 0)
+            strcspn(a, "-") != length || strncmp(a, program, length) != 0)
             continue;
         if (s != last && !scene_traits(s, &bits, e))
             return false;

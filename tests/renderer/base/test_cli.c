@@ -184,6 +184,8 @@ TEST(values_go_where_the_table_says)
                    words, &s, &e));
     assert_int_equal(s.small, UINT32_MAX);
     assert_true(s.big == UINT64_MAX);
+    assert_true(read_bound("--big 010", words, &s, &e)); /* not octal */
+    assert_true(s.big == 10);
     assert_int_equal(s.kind, KIND_B);
     assert_true(s.real == 0.5);
     assert_true(s.seconds == 90);

@@ -109,7 +109,7 @@ struct tail_job {
 };
 
 /* A pixel of a region, straight from a library: whole images for every region would take hours. */
-static struct estimate pick_pixel(struct library *l, int merge)
+static struct pixel_estimate pick_pixel(struct library *l, int merge)
 {
     struct block b = {0, 0, 0};
     for (int k = 0; k < merge; k++) {
@@ -148,8 +148,8 @@ static bool tail_part(void *arg, int part, size_t first, size_t end, double coun
         struct cell sum = {0};
         library_renew(&library, 1);
         for (int p = 0; p < REGION_PIXELS; p++) {
-            struct estimate a = pick_pixel(&library, cell->n_a / block);
-            struct estimate b = {.mean = library_mean(&library)};
+            struct pixel_estimate a = pick_pixel(&library, cell->n_a / block);
+            struct pixel_estimate b = {.mean = library_mean(&library)};
             if (cell->n_b > 0)
                 b = pick_pixel(&library, cell->n_b / block);
             pyramid_add_pixel(&sum, &a, &b);

@@ -124,8 +124,8 @@ TEST(test_pyramid_brute_force)
                     for (int y = r.y; y < r.y + r.height; y++)
                         for (int x = r.x; x < r.x + r.width; x++, covered++) {
                             size_t px = (size_t)y * (size_t)w + (size_t)x;
-                            struct estimate ea = pyramid_pixel_estimate(&a, px, channel);
-                            struct estimate eb = pyramid_pixel_estimate(&b, px, channel);
+                            struct pixel_estimate ea = pyramid_pixel_estimate(&a, px, channel);
+                            struct pixel_estimate eb = pyramid_pixel_estimate(&b, px, channel);
                             sa += ea.mean;
                             vb += eb.v;
                             k3 += ea.k3 - eb.k3;
@@ -235,7 +235,7 @@ TEST(test_estimate_by_hand)
     for (int channel = 0; channel < 4; channel++) {
         const double scales[4] = {1, 0.5, 0.25, 0.2126 + 0.7152 / 2 + 0.0722 / 4};
         double s = scales[channel], v = s * s * 14 / 6, k3 = s * s * s * 3;
-        struct estimate est = pyramid_pixel_estimate(&m, 0, channel);
+        struct pixel_estimate est = pyramid_pixel_estimate(&m, 0, channel);
         assert_near(est.mean, 3 * s, 1e-12);
         assert_near(est.v, v, 1e-12);
         assert_near(est.k3, k3, 1e-12);

@@ -657,7 +657,7 @@ TEST(all_samples_are_right_for_a_noisy_image)
         submitted_image_expect(&t->h.image[0], &reference, SPP);
         snprintf(t->h.made[0].rates, sizeof t->h.made[0].rates, "%s", test_path("all.png"));
         MUST(image_write_png(t->h.made[0].rates, WIDTH, HEIGHT, red, &e));
-        grade_checks_rates(&t->g, 0, &t->r.check[0], &out);
+        assert_true(grade_checks_rates(&t->g, 0, &t->r.check[0], &out, &e));
         assert_true(out.share == (noisy ? 1 : 0));
         end(t);
     }
