@@ -5,6 +5,7 @@
 #include "renderer/base/fs.h"
 
 #include <ctype.h>
+#include <fnmatch.h>
 
 enum { MOST_TESTS = 200 };
 static struct CMUnitTest tests[MOST_TESTS];
@@ -133,8 +134,18 @@ void test_same_text(const char *text, const char *expected)
     free(file);
 }
 
-int main(void)
+/* Runs the tests whose names match the argument, a shell's pattern; without one, all. */
+int main(int argc, char **argv)
 {
+    size_t wanted = 0;
+    for (size_t i = 0; i < num_tests; i++)
+        if (argc < 2 || fnmatch(argv[1], tests[i].name, 0) == 0)
+            tests[wanted++] = tests[i];
+    if (wanted == 0 && num_tests > 0) {
+        fprintf(stderr, "no test matches '%s'\n", argv[1]);
+        return 1;
+    }
+    num_tests = wanted;
     int failed = _cmocka_run_group_tests("tests", tests, num_tests, group_set_up, group_tear_down);
     struct err e;
     if (dir_is_made && !fs_remove_tree(dir, &e))
