@@ -209,10 +209,9 @@ static bool check_moments(const struct moments *m, const json_t *entry, const ch
     if (!check_string(entry, "unit", m->unit, exr, "its unit is not that of its manifest", e))
         return false;
     /* "sample": n may differ between pixels; "picture": n is not a count. */
-    if (strcmp(m->unit, "sample") == 0 || strcmp(m->unit, "picture") == 0)
+    if (strcmp(m->unit, "sample") == 0 || moments_noise_is_unknown(m))
         return true;
-    double n =
-        strcmp(m->unit, "exact") == 0 ? 1 : json_number_value(json_object_get(entry, "replicates"));
+    double n = moments_is_exact(m) ? 1 : json_number_value(json_object_get(entry, "replicates"));
     for (size_t p = 0; p < (size_t)m->width * (size_t)m->height; p++)
         if (m->n[p] != n)
             return err_set(e, "%s: pixel %zu holds %g observations, not %g", exr, p, m->n[p], n);

@@ -152,10 +152,20 @@ struct moments moments_rows(const struct moments *m, int y, int num)
     return rows;
 }
 
+bool moments_is_exact(const struct moments *m)
+{
+    return strcmp(m->unit, "exact") == 0;
+}
+
+bool moments_noise_is_unknown(const struct moments *m)
+{
+    return strcmp(m->unit, "picture") == 0;
+}
+
 double moments_var_of_mean(const struct moments *m, size_t pixel, int channel)
 {
     double n = moments_n(m, pixel);
-    if (strcmp(m->unit, "exact") == 0)
+    if (moments_is_exact(m))
         return 0;
     if (strcmp(m->unit, "stratified") == 0)
         return NAN;

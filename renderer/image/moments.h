@@ -66,6 +66,9 @@ NODISCARD bool moments_merge(struct moments *dst, const struct moments *src, str
 struct moments moments_run(const struct moments *m, size_t first, int num);
 /* A view of rows y .. y+num-1. Owns nothing. */
 struct moments moments_rows(const struct moments *m, int y, int num);
+/* Is the unit "exact", or "picture": a mean without noise, or with noise that nothing is known of? */
+bool moments_is_exact(const struct moments *m);
+bool moments_noise_is_unknown(const struct moments *m);
 /* Variance of the pixel's mean, M2/(n(n-1)); NAN if n < 2 or stratified, 0 if exact. channel 0..2. */
 double moments_var_of_mean(const struct moments *m, size_t pixel, int channel);
 

@@ -53,7 +53,7 @@ ISA_CLONES static void fill_side(const struct error_modes *modes, struct error_m
                                  int side)
 {
     const struct moments *m = modes->side[side];
-    const bool exact = strcmp(m->unit, "exact") == 0;
+    const bool exact = moments_is_exact(m);
     const int x = f->x > 0 ? f->x : 0, right = f->x + f->across;
     const size_t room = f->room, left = (size_t)(x - f->x);
     for (int y = f->y; y < f->y + f->down; y++) {
@@ -87,7 +87,7 @@ static void fill_root(const struct error_modes *modes, struct error_modes_frame 
                       struct rect r)
 {
     const struct moments *m = modes->side[side];
-    const bool exact = strcmp(m->unit, "exact") == 0;
+    const bool exact = moments_is_exact(m);
     for (int y = r.y; y < r.y + r.height; y++)
         for (int x = r.x; x < r.x + r.width; x++) {
             size_t to = error_modes_at(f, x, y),

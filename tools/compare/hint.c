@@ -275,7 +275,7 @@ static bool open_images(const struct moments *a, const struct moments *b, struct
 {
     static const double least = 0.03, dust = 1e-6;
     *m = (struct images){.side = {a, b},
-                         .exact = {strcmp(a->unit, "exact") == 0, strcmp(b->unit, "exact") == 0},
+                         .exact = {moments_is_exact(a), moments_is_exact(b)},
                          .columns = (b->width + BLOCK - 1) / BLOCK,
                          .rows = (b->height + BLOCK - 1) / BLOCK};
     size_t blocks = (size_t)m->columns * (size_t)m->rows,
@@ -342,7 +342,8 @@ static void try(void *ctx, size_t first, size_t last)
 bool hint_add(const struct moments *a, const struct moments *b, int threads, struct comparison *c,
               struct err *e)
 {
-    static const double clearly = 0.01; /* how much more a change must remove than those before it in `order` */
+    static const double clearly =
+        0.01; /* how much more a change must remove than those before it in `order` */
     struct images m;
     struct trials t = {.images = &m};
     double most = enough_removed - clearly;

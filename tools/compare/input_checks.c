@@ -45,22 +45,16 @@ static bool check_pixel(const struct moments *m, size_t p, bool exact, struct er
     return true;
 }
 
-/* Is the unit "picture"? Then the variance is the other side's, too, and n is not a count (moments.h). */
-static bool is_image(const struct moments *m)
-{
-    return strcmp(m->unit, "picture") == 0;
-}
-
 /* Checks one side and gathers what it contributes to the judge. `event`: the typical
  * brightness of an observation that matters, E[x^2]/E[x]; for something rarely seen, its brightness when seen. */
 static bool check_side(const struct moments *m, struct judge *j, struct err *e)
 {
-    bool exact = strcmp(m->unit, "exact") == 0, replicates = strcmp(m->unit, "replicate") == 0;
+    bool exact = moments_is_exact(m), replicates = strcmp(m->unit, "replicate") == 0;
     if (strcmp(m->unit, "stratified") == 0)
         return err_set(e,
                        "its samples depend on each other (--sampler sobol), so its variance is "
                        "unknown: compare directories of 16 renders each, made with --seed 1 to 16");
-    if (!exact && !replicates && !is_image(m) && strcmp(m->unit, "sample") != 0)
+    if (!exact && !replicates && !moments_noise_is_unknown(m) && strcmp(m->unit, "sample") != 0)
         return err_set(e, "unknown unit '%s' of an observation", m->unit);
     bool varies = false;
     size_t pixels = (size_t)m->width * (size_t)m->height;
@@ -87,7 +81,7 @@ static bool check_side(const struct moments *m, struct judge *j, struct err *e)
 /* Refuses the same seeds on both sides: their observations are the same, so that no difference could show. */
 static bool check_shared(const struct moments *a, const struct moments *b, struct err *e)
 {
-    if (strcmp(a->unit, "exact") == 0 || strcmp(b->unit, "exact") == 0 || is_image(a))
+    if (moments_is_exact(a) || moments_is_exact(b) || moments_noise_is_unknown(a))
         return true;
     size_t pixels = (size_t)a->width * (size_t)a->height, shared = variance_ratio_shared(a, b);
     if (shared > 0)
@@ -104,8 +98,9 @@ static bool check_shared(const struct moments *a, const struct moments *b, struc
 static void set_shares(const struct moments *a, const struct moments *b, struct judge *j)
 {
     static const double part[NUM_STATISTICS] = {.25, .40, .10, .15, .10};
-    bool pixels = j->width * j->height > 1, noise_a = strcmp(a->unit, "exact") != 0;
-    bool noise_b = strcmp(b->unit, "exact") != 0, known = !is_image(a) && !is_image(b);
+    bool pixels = j->width * j->height > 1, noise_a = !moments_is_exact(a);
+    bool noise_b = !moments_is_exact(b),
+         known = !moments_noise_is_unknown(a) && !moments_noise_is_unknown(b);
     bool applies[NUM_STATISTICS] = {
         [STATISTIC_IMAGE] = true,
         [STATISTIC_PYRAMID] = pixels,
@@ -129,9 +124,9 @@ bool input_checks_run(const struct moments *a, const struct moments *b,
     if (!check_options(opt, e))
         return false;
     *j = (struct judge){.opt = *opt, .width = a->width, .height = a->height, .n_min = INFINITY};
-    j->is_pooled = is_image(a);
-    j->exact[0] = strcmp(a->unit, "exact") == 0;
-    j->exact[1] = strcmp(b->unit, "exact") == 0;
+    j->is_pooled = moments_noise_is_unknown(a);
+    j->exact[0] = moments_is_exact(a);
+    j->exact[1] = moments_is_exact(b);
     set_shares(a, b, j);
     if (!check_side(a, j, e))
         return err_prefix(e, "A");

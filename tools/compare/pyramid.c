@@ -46,8 +46,8 @@ ISA_CLONES static void estimate(const struct moments *m, bool exact, int channel
     }
     for (size_t p = 0; p < num; p++) {
         const double v = r->v[p], k3 = root != NULL ? root[first + p] : r->k3[p];
-        const struct pixel_estimate est = pyramid_estimate_from(r->mean[p], luminance ? v * v : v,
-                                                          luminance ? k3 * k3 * k3 : k3, r->n[p]);
+        const struct pixel_estimate est = pyramid_estimate_from(
+            r->mean[p], luminance ? v * v : v, luminance ? k3 * k3 * k3 : k3, r->n[p]);
         r->v[p] = est.v;
         r->k3[p] = est.k3;
         r->var_v[p] = est.var_v;
@@ -59,24 +59,20 @@ ISA_CLONES static void estimate(const struct moments *m, bool exact, int channel
 static struct pixel_estimate of_pixel(const struct run *r, size_t p)
 {
     return (struct pixel_estimate){r->mean[p],         r->v[p],      r->k3[p],       r->var_v[p],
-                             r->var_v_normal[p], r->var_k3[p], r->tolerance[p]};
-}
-
-static bool is_exact(const struct moments *m)
-{
-    return strcmp(m->unit, "exact") == 0;
+                                   r->var_v_normal[p], r->var_k3[p], r->tolerance[p]};
 }
 
 struct pixel_estimate pyramid_pixel_estimate(const struct moments *m, size_t pixel, int channel)
 {
     struct run r;
-    const bool exact = is_exact(m);
+    const bool exact = moments_is_exact(m);
     assert(exact || moments_n(m, pixel) >= 3);
     estimate(m, exact, channel, pixel, 1, NULL, &r);
     return of_pixel(&r, 0);
 }
 
-void pyramid_add_pixel(struct cell *dst, const struct pixel_estimate *a, const struct pixel_estimate *b)
+void pyramid_add_pixel(struct cell *dst, const struct pixel_estimate *a,
+                       const struct pixel_estimate *b)
 {
     dst->a += a->mean;
     dst->b += b->mean;
@@ -134,7 +130,7 @@ static void fill_pixels(const struct moments *a, const struct moments *b, int ch
                         double *const root[2], struct pyramid_level *level)
 {
     const size_t pixels = (size_t)level->nx * (size_t)level->ny;
-    const bool exact_a = is_exact(a), exact_b = is_exact(b);
+    const bool exact_a = moments_is_exact(a), exact_b = moments_is_exact(b);
     const bool observed = is_observed(a) && is_observed(b);
     struct run run[2];
     for (size_t p = 0; p < pixels; p++) {

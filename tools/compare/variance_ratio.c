@@ -21,7 +21,7 @@ static const double least_shared = 0.25;
  * none. */
 static double paths(const struct moments *m, const struct moments *other)
 {
-    if (strcmp(m->unit, "picture") == 0)
+    if (moments_noise_is_unknown(m))
         return 0;
     if (m->spp > 0 && other->spp > 0)
         return m->spp;
@@ -101,8 +101,7 @@ struct variance_ratio variance_ratio_test(const struct moments *a, const struct 
     double paths_a = paths(a, b), paths_b = paths(b, a);
     *log10_p = 0;
     *testable = false;
-    if (strcmp(a->unit, "exact") == 0 || strcmp(b->unit, "exact") == 0 || paths_a == 0 ||
-        paths_b == 0)
+    if (moments_is_exact(a) || moments_is_exact(b) || paths_a == 0 || paths_b == 0)
         return out;
     struct pixels s = sum_pixels(a, b, paths_a, paths_b);
     if (!(s.a > 0 && s.b > 0) || s.num < 3)

@@ -132,7 +132,7 @@ static void print_observations(FILE *f, const struct moments *m)
     for (size_t i = 0; i < pixels; i++)
         sum += m->n[i];
     double n = sum / (double)pixels;
-    if (strcmp(m->unit, "exact") == 0)
+    if (moments_is_exact(m))
         fputs("without noise", f);
     else if (strcmp(m->unit, "sample") == 0)
         fprintf(f, "%.0f samples per pixel", n);

@@ -52,7 +52,7 @@ static struct cell cell_of(const struct moments *a, const struct moments *b, str
         for (int x = r.x; x < r.x + r.width; x++) {
             size_t p = (size_t)y * (size_t)a->width + (size_t)x;
             struct pixel_estimate ea = pyramid_pixel_estimate(a, p, channel),
-                            eb = pyramid_pixel_estimate(b, p, channel);
+                                  eb = pyramid_pixel_estimate(b, p, channel);
             pyramid_add_pixel(&sum, &ea, &eb);
         }
     return sum;
@@ -158,7 +158,7 @@ bool two_stage_check_fresh(const struct moments *first, const struct moments *ag
     size_t values = 3 * (size_t)first->width * (size_t)first->height, same = 0;
     while (same < values && moments_mean(first, same) == moments_mean(again, same))
         same++;
-    if (strcmp(first->unit, "exact") != 0 && same == values)
+    if (!moments_is_exact(first) && same == values)
         return err_set(e,
                        "is the same image as its first render: a second stage needs fresh seeds");
     return true;

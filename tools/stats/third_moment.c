@@ -149,7 +149,7 @@ static void set_third(struct moments *m, size_t p, int c, double k3)
 static double third(const struct moments *m, size_t p, int c)
 {
     double n = m->n[p];
-    return strcmp(m->unit, "exact") == 0 ? 0 : m->m3[3 * p + (size_t)c] / (n * (n - 1) * (n - 2));
+    return moments_is_exact(m) ? 0 : m->m3[3 * p + (size_t)c] / (n * (n - 1) * (n - 2));
 }
 
 /* pyramid_estimate_from() takes k3^2/v for the variance of v: what is added to both k3 cancels in k3A - k3B and

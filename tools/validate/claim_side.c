@@ -243,7 +243,7 @@ static bool make(struct validation *v, struct side *s, int stage, int look, stru
     int first = l >= 0 ? side_count(s, l) : 0;
     const struct side_image *before = l >= 0 ? &s->at[stage][l] : NULL;
     /* More replicates of an engine without noise would be the same image. */
-    if (before != NULL && (first == side_count(s, look) || strcmp(before->m.unit, "exact") == 0))
+    if (before != NULL && (first == side_count(s, look) || moments_is_exact(&before->m)))
         return add_before(before, out, &s->e);
     bool ok = false;
     switch (s->kind) {

@@ -255,11 +255,6 @@ static void pair_free(struct pair *p)
     moments_free(&p->estimated[1]);
 }
 
-static bool has_no_noise(const struct moments *m)
-{
-    return strcmp(m->unit, "picture") == 0;
-}
-
 /* Copies both means and estimates their noise from A - B; images that are the same to the bit (an unchanged program
  * without seeds) count as exact. */
 static bool estimate(struct pair *p, struct err *e)
@@ -303,7 +298,7 @@ static bool both_of(void *ctx, int stage, const struct moments **a, const struct
         return false;
     *a = &p->image[0]->m;
     *b = &p->image[1]->m;
-    if (!has_no_noise(*a) && !has_no_noise(*b))
+    if (!moments_noise_is_unknown(*a) && !moments_noise_is_unknown(*b))
         return true;
     if (!estimate(p, e))
         return false;
