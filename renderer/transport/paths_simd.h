@@ -7,7 +7,6 @@
 #include "renderer/shading/bsdf_simd.h"
 #include "renderer/shading/light_simd.h"
 
-/* True if light after that many bounces is part of the image. */
 static inline bool counts(const struct integrator *it, int bounces)
 {
     return bounces >= it->opt.first_bounce && bounces <= it->opt.max_bounces;
