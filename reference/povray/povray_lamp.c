@@ -3,10 +3,10 @@
 #include <assert.h>
 #include <gsl/gsl_math.h>
 
-static bool find_rectangle(const struct scene *s, const struct light *l, struct povray_lamp *out)
+static void find_rectangle(const struct scene *s, const struct light *l, struct povray_lamp *out)
 {
     if (l->count != 2)
-        return false;
+        return;
     const vec3 *p = &s->position[3 * (size_t)l->first], *q = p + 3;
     vec3 n = cross(sub(p[1], p[0]), sub(p[2], p[0]));
     float size = length(sub(p[1], p[0])) + length(sub(p[2], p[0]));
@@ -25,10 +25,9 @@ static bool find_rectangle(const struct scene *s, const struct light *l, struct 
             out->edge2 = sub(c, own);
             out->normal = normalize(n);
             out->area = length(n);
-            return true;
+            return;
         }
     }
-    return false;
 }
 
 bool povray_lamp(const struct scene *s, const struct light *l, struct povray_lamp *out)

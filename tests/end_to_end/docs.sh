@@ -63,10 +63,6 @@ cd "$tmp" || exit 1
 ln -s "$build" build
 ln -s "$top/tools" "$top/reference" "$top/tests" "$top/golden" .
 
-# Code in a page: the indented lines below a heading.
-code_below() { # PAGE HEADING
-    awk -v head="$2" '/^#/ { on = $0 == head } on && sub(/^    /, "")' "$1"
-}
 # The commands of a page in their order: indented lines outside fences, without what programs print (judged:, result:, look:) and
 # blocks behind a comment "not run: WHY". `make TARGET` is only looked up, and lines that say "minutes" are left out.
 page_commands() { # PAGE

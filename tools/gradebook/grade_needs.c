@@ -29,6 +29,11 @@ const char *grade_state(const json_t *grade)
     return made_an_image(grade) ? NULL : "no image";
 }
 
+bool grade_is_full(const json_t *check)
+{
+    return member_number(check, "share") >= 1;
+}
+
 bool grade_is_provisional(const json_t *object)
 {
     json_each(c, json_object_get(object, "checks"))

@@ -13,5 +13,7 @@ bool grade_needs(const json_t *grade, char *text, size_t size);
 const char *grade_state(const json_t *grade);
 /* Is a check, or any check of a grade, provisional? Its points are kept until staff have looked. */
 bool grade_is_provisional(const json_t *object);
+/* Has a check all its points? */
+bool grade_is_full(const json_t *check);
 
 #endif

@@ -27,11 +27,6 @@ static bool is_judged(const json_t *check)
     return json_is_true(json_object_get(check, "judged"));
 }
 
-static bool is_full(const json_t *check)
-{
-    return member_number(check, "share") >= 1;
-}
-
 /* What a student reads of a check. */
 static void describe(const json_t *c, char *out, size_t size)
 {
@@ -43,7 +38,7 @@ static void describe(const json_t *c, char *out, size_t size)
         text_append(
             out, size,
             "Provisional: the samples did not suffice to decide this; the points are kept until staff have looked.\n");
-    else if (!is_full(c) && member_number(c, "share") > 0)
+    else if (!grade_is_full(c) && member_number(c, "share") > 0)
         text_append(out, size, "Partial credit: %.2f of %g points.\n", member_number(c, "points"),
                     member_number(c, "of"));
     text_append(out, size, "Expected: %s.\nSeen: %s.", member_or_empty(c, "expected"),
@@ -56,9 +51,9 @@ static void describe(const json_t *c, char *out, size_t size)
         text_append(out, size,
                     "\nExplained by what the starter code does (%s): no points lost for that.",
                     accepted);
-    if (!is_full(c) && hint[0] != '\0')
+    if (!grade_is_full(c) && hint[0] != '\0')
         text_append(out, size, "\nHint: %s", hint);
-    if (!is_full(c) && where[0] != '\0')
+    if (!grade_is_full(c) && where[0] != '\0')
         text_append(out, size, "\nWhere: %s", where);
     if (!is_judged(c))
         text_append(out, size, "\nNot judged: staff have to look at this.");
@@ -119,7 +114,7 @@ static json_t *gradescope(const json_t *grade)
                                                member_number(c, "of"), "name", name, "number",
                                                number, "output", output, "visibility",
                                                member_or_empty(c, "visibility"), "status",
-                                               is_full(c) ? "passed" : "failed"));
+                                               grade_is_full(c) ? "passed" : "failed"));
     }
     char whole[2048];
     describe_whole(grade, whole, sizeof whole);
@@ -189,7 +184,7 @@ static void write_junit(FILE *f, const json_t *grades)
         size_t failures = 0, errors = member_or_empty(g, "trouble")[0] != '\0',
                checks = json_array_size(json_object_get(g, "checks"));
         json_each(c, json_object_get(g, "checks")) {
-            failures += is_judged(c) && !is_full(c);
+            failures += is_judged(c) && !grade_is_full(c);
             errors += !is_judged(c);
         }
         fputs("<testsuite", f);
@@ -212,7 +207,7 @@ static void write_junit(FILE *f, const json_t *grades)
             xml_pair(f, "classname", member_or_empty(c, "part"));
             xml_pair(f, "name", member_or_empty(c, "name"));
             fputs(" time=\"0\">", f);
-            if (!is_full(c)) {
+            if (!grade_is_full(c)) {
                 fputs(is_judged(c) ? "<failure type=\"points\"" : "<error type=\"not judged\"", f);
                 xml_pair(f, "message", member_or_empty(c, "seen"));
                 fputc('>', f);

@@ -41,15 +41,11 @@ static void show_chance(FILE *f, double chance, bool moves, const char *here)
     fputs("</p>\n", f);
 }
 
-static bool is_full(const json_t *check)
-{
-    return member_number(check, "share") >= 1;
-}
-
 /* Does it stand before the fold? */
 static bool stands_out(const struct page *p, const json_t *check)
 {
-    return !is_full(check) || grade_is_provisional(check) || member_text(check, "appeal") != NULL ||
+    return !grade_is_full(check) || grade_is_provisional(check) ||
+           member_text(check, "appeal") != NULL ||
            (p->staff && (member_or_empty(check, "flag")[0] != '\0' ||
                          !json_is_true(json_object_get(check, "judged"))));
 }
@@ -102,7 +98,7 @@ static bool show_check(const struct page *p, const json_t *c, struct err *e)
 {
     FILE *f = p->f;
     double share = member_number(c, "share");
-    bool full = is_full(c), judged = json_is_true(json_object_get(c, "judged"));
+    bool full = grade_is_full(c), judged = json_is_true(json_object_get(c, "judged"));
     const char *visibility = member_or_empty(c, "visibility");
     html_print(f, "<section id=\"check-%s\"><h3>%s <span class=\"%s\">%.2f of %g</span>",
                member_text(c, "name"), member_text(c, "title"), full ? "full" : "lost",

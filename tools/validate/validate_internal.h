@@ -11,7 +11,7 @@
 
 #include <pthread.h>
 
-enum { MAX_PATH = 8192, NUM_STAGES = 2, CLAIM_NAME = 256 };
+enum { NUM_STAGES = 2, CLAIM_NAME = 256 };
 /* Of a scene: each reference against ours, the closed form and the further engine; that engine against ours; variants;
  * stated errors; noise. */
 enum { MAX_CLAIMS = 3 * MAX_REFERENCES + MAX_VARIANTS + 3 };
