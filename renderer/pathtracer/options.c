@@ -139,110 +139,122 @@ static bool read_starter(void *options, const char *const v[4], struct err *e)
 #define TO(member) CLI_TO(struct options, member)
 
 static const struct cli_option options[] = {
-    {'s', "spp", "N", "paths per pixel (16)", TO(spp), 1, MAX_SPP},
+    {'s', "spp", "N", "samples (camera paths) per pixel; the maximum if adaptive (16)", TO(spp), 1,
+     MAX_SPP},
     {0, "samples", "A:B",
-     "only sample numbers A to B-1 of those (0:spp); assay merge\n"
-     "adds such shares",
+     "render only sample numbers A to B-1 (0:spp); assay merge\n"
+     "combines such partial renders",
      CLI_TO_RANGE(struct options, first), 0, MAX_SPP, .noun = "sample"},
-    {'l', "light-samples", "N", "samples per area light and vertex (1)", TO(light_samples), 1,
-     65536},
-    {'t', "threads", "N", "threads; 0: one per processor (0)", TO(threads), 0, 1024},
-    {'m', "max-bounces", "N", "0: emission seen directly, 1: + direct light, ... (5)",
+    {'l', "light-samples", "N", "samples of each area light at each path vertex (1)",
+     TO(light_samples), 1, 65536},
+    {'t', "threads", "N", "number of threads; 0: one per processor (0)", TO(threads), 0, 1024},
+    {'m', "max-bounces", "N", "maximum bounces; 0: emission only, 1: plus direct light, ... (5)",
      TO(max_bounces), 0, 10000},
-    {'o', "accumulate", "0|1", "0: only light that bounced exactly -m times (1)", TO(accumulate), 0,
-     1},
-    {0, "first-bounce", "N", "leave out light with fewer bounces (0)", TO(first_bounce), 0, 10000},
-    {0, "only", "PART", "direct: at most one bounce; indirect: two or more", .read = read_only},
-    {'H', "hemisphere", "", "short for --direct hemisphere", TO(direct), DIRECT_HEMISPHERE},
-    {0, "direct", "HOW", "hemisphere, light, bsdf or mis (mis)", TO(direct),
-     .names = direct_kind_names},
+    {'o', "accumulate", "0|1", "0: only light with exactly -m bounces; 1: also with fewer (1)",
+     TO(accumulate), 0, 1},
+    {0, "first-bounce", "N", "exclude light with fewer than N bounces (0)", TO(first_bounce), 0,
+     10000},
+    {0, "only", "PART", "direct: light with at most 1 bounce; indirect: with 2 or more (all)",
+     .read = read_only},
+    {'H', "hemisphere", "", "same as --direct hemisphere", TO(direct), DIRECT_HEMISPHERE},
+    {0, "direct", "HOW", "sampling of direct light: hemisphere, light, bsdf or mis (mis)",
+     TO(direct), .names = direct_kind_names},
     {0, "roulette", "on|off|P",
-     "end paths at random, without bias: dim ones, or all, which\n"
-     "go on with probability P, 0.7 in the assignment (on)",
+     "Russian roulette: on: by path throughput; P: with this fixed\n"
+     "survival probability (0.7 in the assignment); unbiased (on)",
      .read = read_roulette},
     {'a', "adaptive", "N TOL",
-     "every N samples a pixel stops if its 95 % interval\n"
-     "is within TOL of its mean; biased (off)",
+     "every N samples, stop pixels whose 95 % confidence interval has\n"
+     "a half-width of at most TOL x mean; biased (off)",
      .read = read_adaptive},
     {0, "adaptive-unbiased", "TOL",
-     "a pilot that is not averaged in decides how many samples\n"
-     "a pixel needs for that; unbiased (off)",
+     "choose each pixel's sample count for TOL from a pilot render\n"
+     "that is not part of the result; unbiased (off)",
      TO(pilot_tolerance), 0, 1e6},
-    {0, "pilot", "N", "samples per pixel of the pilot (32)", TO(pilot), 2, 1 << 20},
-    {0, "time", "T", "stop after 90, 90s, 5m or 2h (off; -s is then unlimited)", TO(max_seconds), 0,
-     1e9, .unit = cli_time_units},
+    {0, "pilot", "N", "samples per pixel of the pilot, and each pixel's minimum (32)", TO(pilot), 2,
+     1 << 20},
+    {0, "time", "T", "time limit: 90, 90s, 5m or 2h (off); -s then defaults to no limit",
+     TO(max_seconds), 0, 1e9, .unit = cli_time_units},
     {0, "error", "P%",
-     "stop when the root mean square standard error of a pixel is\n"
-     "P % of the mean luminance (off; -s is then unlimited)",
+     "stop when the RMS over pixels of the standard error is at most\n"
+     "P % of the mean luminance (off); -s then defaults to no limit",
      TO(max_error), 0, 100, .unit = percent},
-    {0, "write-every", "T", "write images and state meanwhile, every 60, 60s, 5m, 1h (off)",
+    {0, "write-every", "T", "write images and state file periodically: 60, 60s, 5m, 1h (off)",
      TO(write_every), 0, 1e9, .unit = cli_time_units},
-    {0, "resume", "FILE", "go on with the render that left FILE.state; same options", TO(resume)},
+    {0, "resume", "FILE", "continue the render that wrote FILE.state; needs the same options",
+     TO(resume)},
     {0, "keep-state", "",
-     "leave the state beside the first image even when done,\n"
-     "to add samples later",
+     "keep the state file beside the first image after the render\n"
+     "is complete, to add samples later",
      TO(keep_state)},
-    {'e', "environment", "FILE", "environment map in latitude and longitude, .exr or .hdr",
+    {'e', "environment", "FILE", "environment map, latitude-longitude, .exr or .hdr (none)",
      TO(environment_file)},
-    {'b', "lens-radius", "R", "thin lens, scene units; 0: pinhole (0)", TO(lens_radius), 0, 1e6},
-    {'d', "focal-distance", "D", "distance in focus, scene units (4.7)", TO(focal_distance), 1e-6,
-     1e9},
+    {'b', "lens-radius", "R", "radius of the thin lens, scene units; 0: pinhole (0)",
+     TO(lens_radius), 0, 1e6},
+    {'d', "focal-distance", "D", "distance of the plane in focus, scene units (4.7)",
+     TO(focal_distance), 1e-6, 1e9},
     {0, "slurm", "N",
-     "in N jobs on a Slurm cluster, by the assay beside this program;\n"
-     "the same bits (off)",
+     "render as about N jobs on a Slurm cluster, through the assay\n"
+     "program beside this one; result is bit-identical (off)",
      TO(slurm), 1, 1000000},
     {'f', "out", "FILE",
-     "image; may be given again. .exr: float32 with moments,\n"
-     ".png: 8 bits by the dialect's tone curve",
+     "output image; repeatable. .exr: 32-bit floats with moments,\n"
+     ".png: 8 bits, with the dialect's tone curve",
      .read = read_output},
-    {0, "aov", "", "add to .exr: variance, stderr, depth, normal, albedo, object id", TO(aov)},
+    {0, "aov", "",
+     "add layers to .exr: variance, stderr, depth, normal, albedo,\n"
+     "object id",
+     TO(aov)},
     {0, "heatmap", "FILE",
-     "PNG of the BVH nodes that the ray through each pixel's\n"
-     "centre visits",
+     "PNG of the number of BVH nodes visited by the ray through each\n"
+     "pixel's centre",
      .read = read_heatmap},
-    {'r', "resolution", "W H", "pixels, also as WxH (800 600)", TO(width), 1, 65535},
+    {'r', "resolution", "W H", "image size in pixels, also as WxH (800 600)", TO(width), 1, 65535},
     {0, "filter", "HOW",
-     "of a pixel: box, box:RADIUS, tent:RADIUS or gauss:SIGMA:RADIUS,\n"
-     "in pixels (box:0.5)",
+     "pixel reconstruction filter: box, box:RADIUS, tent:RADIUS or\n"
+     "gauss:SIGMA:RADIUS, in pixels (box:0.5)",
      .read = read_filter},
-    {'p', "cell", "X Y DX DY", "render only this cell, origin at the bottom left",
-     .read = read_cell},
+    {'p', "cell", "X Y DX DY",
+     "render only DX x DY pixels from X Y, origin at the bottom left (all)", .read = read_cell},
     {'c', "camera", "NAME",
-     "the scene's camera of that name, or a file of camera settings\n"
-     "as the assignment's GUI writes them (the first camera)",
+     "name of a camera of the scene, or a camera settings file as the\n"
+     "assignment's GUI writes it (the first camera)",
      TO(camera_file)},
-    {0, "list-cameras", "", "print the scene's cameras", TO(action), ACTION_CAMERAS},
+    {0, "list-cameras", "", "print the scene's cameras and exit", TO(action), ACTION_CAMERAS},
     {0, "seed", "N[,N...]",
-     "64-bit seed of all samples (1); of several an image each,\n"
+     "64-bit random seed (1); with several, one image for each, named\n"
      "FILE_N.exr",
      .read = read_seeds},
-    {0, "sampler", "NAME", "independent or sobol: less noise, but unknown error (independent)",
+    {0, "sampler", "NAME", "independent, or sobol: less noise, no error estimate (independent)",
      TO(sampler), .names = sampler_kind_names},
-    {0, "integrator", "NAME", "path or normals (path)", TO(kind), .names = integrator_kind_names},
-    {0, "accel", "NAME", "bruteforce, centroid, sah or wide (wide)", TO(accel),
+    {0, "integrator", "NAME", "path, or normals: the shading normals as colours (path)", TO(kind),
+     .names = integrator_kind_names},
+    {0, "accel", "NAME", "ray acceleration: bruteforce, centroid, sah or wide (wide)", TO(accel),
      .names = bvh_kind_names},
     {0, "isa", "NAME",
-     "vector instructions: auto, sse4.2, avx2, avx512, or scalar\n"
-     "paths; all give the same image (auto; scalar with another\n"
-     "--accel than wide)",
+     "SIMD instructions: auto, sse4.2, avx2, avx512, or scalar: one\n"
+     "path at a time; all give the same image (auto with --accel wide,\n"
+     "else scalar)",
      TO(isa), .names = isa_names},
     {0, "dialect", "NAME",
-     "auto, collada or cgl: whose rules for camera and lights;\n"
+     "rules for camera and lights: collada, cgl (the assignment's), or\n"
      "auto: cgl if the file has CGL extras (auto)",
      TO(dialect), .names = dialect_names},
-    {0, "fresnel", "HOW", "of glass: exact, or schlick as in the assignment (exact)", TO(fresnel),
-     .names = fresnel_names},
+    {0, "fresnel", "HOW", "reflectance of glass: exact, or schlick as in the assignment (exact)",
+     TO(fresnel), .names = fresnel_names},
     {0, "frame", "HOW",
-     "dialect cgl: crop the assignment's 800 x 600 to -r as it\n"
-     "does, or the whole of it (crop)",
+     "with dialect cgl: crop the view of 800 x 600 pixels to -r, as the\n"
+     "assignment does, or show the whole view (crop)",
      TO(frame), .names = frame_names},
     {0, "starter", "DEFECT",
-     "do wrong what the assignment's starter code does: light-pdf,\n"
-     "turned-lamp, beckmann; for grading; may be given again",
+     "reproduce a defect of the assignment's starter code, for grading:\n"
+     "light-pdf, turned-lamp or beckmann; repeatable (none)",
      .read = read_starter},
     {'q', "quiet", "", "no progress, no statistics", TO(quiet)},
-    {0, "list", "", "print the names that options take", TO(action), ACTION_LIST, .stops = true},
-    {0, "version", "", "print version and libraries", TO(action), ACTION_VERSION, .stops = true},
+    {0, "list", "", "print the accepted values of options such as --accel", TO(action), ACTION_LIST,
+     .stops = true},
+    {0, "version", "", "print the versions of program and libraries", TO(action), ACTION_VERSION,
+     .stops = true},
     {'h', "help", "", "print this", TO(action), ACTION_HELP, .stops = true},
     {.read = read_scene}};
 
@@ -340,11 +352,13 @@ void options_print(const struct options *o)
     case ACTION_RENDER:
     case ACTION_CAMERAS: break;
     case ACTION_HELP:
-        cli_print_help("usage: pathtracer [options] -f OUT.exr SCENE.dae\n\n"
-                       "Renders a COLLADA scene by path tracing. Every option with its default:\n",
-                       options);
-        puts("\nCtrl-C (or SIGTERM) ends the pass, writes what there is and says how to go on.\n"
-             "Exit code: 0; 3 with one line on stderr; 130 or 143 after Ctrl-C or SIGTERM.");
+        cli_print_help(
+            "usage: pathtracer [options] -f OUT.exr SCENE.dae\n\n"
+            "Renders a COLLADA scene by path tracing. Options, with defaults in parentheses:\n",
+            options);
+        puts(
+            "\nCtrl-C (or SIGTERM) finishes the current pass, writes the images and prints how to resume.\n"
+            "Exit code: 0 success; 3 error, with one line on stderr; 130 or 143 after Ctrl-C or SIGTERM.");
         break;
     case ACTION_VERSION:
         printf("pathtracer %s, %s, libxml2 %s, nettle %d.%d\n", assay_version,

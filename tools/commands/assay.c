@@ -17,21 +17,22 @@ static const struct {
     int (*run)(int argc, char **argv, struct err *e);
     const char *help;
 } verbs[] = {
-    {"validate", command_validate, "render the suite and judge it against its references"},
-    {"init", command_init, "write a suite of your own that works: scene, reference, CI file"},
-    {"compare", command_compare, "judge two renders, of any kind of file"},
-    {"diagnose", command_diagnose, "name the known bug that explains how a renderer is wrong"},
-    {"converge", command_converge, "measure variance, convergence and efficiency of engines"},
+    {"validate", command_validate, "render the suite and compare it with its references"},
+    {"init", command_init, "create a working suite of your own: scene, reference, CI file"},
+    {"compare", command_compare, "decide whether two renders agree; most image formats"},
+    {"diagnose", command_diagnose, "identify the known bug that explains a renderer's errors"},
+    {"converge", command_converge, "measure variance, convergence and efficiency of renderers"},
     {"grade", command_grade, "grade students' images and programs by a rubric"},
-    {"report", command_report, "make the HTML page of a results.json"},
+    {"report", command_report, "write the HTML page or the tables of a results.json"},
     {"golden", command_golden, "render, inspect and approve the stored references"},
-    {"reference", command_reference, "the same as golden render: with Cycles, POV-Ray ..."},
-    {"merge", command_merge, "add renders of cells or sample ranges of one image"},
-    {"reproduce", command_reproduce, "make a render or results again, and compare bits"},
-    {"plan", command_plan, "cut a render, a batch, a validation or references into jobs"},
-    {"run-job", command_run_job, "make some of the jobs of a plan"},
-    {"gather", command_gather, "put the jobs of a plan together"},
-    {"slurm", command_slurm, "all three, the jobs on a Slurm cluster"},
+    {"reference", command_reference, "same as golden render: by Cycles, POV-Ray or your renderer"},
+    {"merge", command_merge, "combine renders of cells or sample ranges of one image"},
+    {"reproduce", command_reproduce,
+     "re-create a render or results, and compare with the original"},
+    {"plan", command_plan, "split a render, grading, validation or references into jobs"},
+    {"run-job", command_run_job, "run jobs of a plan"},
+    {"gather", command_gather, "combine the results of a plan's jobs"},
+    {"slurm", command_slurm, "plan, run and gather jobs on a Slurm cluster"},
     {"export", command_export, "write a scene for another renderer"},
 };
 
@@ -42,7 +43,7 @@ static void print_help(void)
         printf("  %-12s %s\n", verbs[i].name, verbs[i].help);
     puts("\n`assay VERB --help` lists its options.\n"
          "Exit code: 0 equivalent or as expected, 1 different or not as expected, 2 inconclusive\n"
-         "or nothing found without a margin, 3 could not judge, with one line on stderr.");
+         "or, without a margin, no difference found; 3 could not judge, with one line on stderr.");
 }
 
 /* The allocator of jansson, which is called in hundreds of places: a result that silently lacks a part would be

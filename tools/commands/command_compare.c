@@ -13,13 +13,14 @@
 
 static const char usage[] =
     "usage: assay compare [options] A B\n\n"
-    "A is tested, B is the reference. Each is one of\n"
-    "  a moments EXR (of pathtracer or assay)\n"
-    "  a directory of at least 3 replicates: float EXR or PFM, each with a seed of its own\n"
-    "  an EXR of Mitsuba 3's moment integrator, or NAME.exr with NAME_var.exr (--spp-a, --spp-b)\n"
-    "  an image without moments: EXR, HDR, PFM; its noise is then told by its neighbours\n"
-    "  a PNG of 8 or 16 bits (--curve)\n"
-    "What had to be assumed is printed with the verdict. Procedure: tools/docs/background/verdict.md.\n";
+    "A is the image under test, B is the reference. Each is one of\n"
+    "  a moments EXR (written by pathtracer or assay)\n"
+    "  a directory of at least 3 replicates: float EXR or PFM, each with a different seed\n"
+    "  an EXR of Mitsuba 3's moment integrator, or NAME.exr with NAME_var.exr (give --spp-a, --spp-b)\n"
+    "  an image without moments: EXR, HDR, PFM; noise is estimated from neighbouring pixels of A - B\n"
+    "  a PNG of 8 or 16 bits (give --curve)\n"
+    "Any assumptions made about them are printed with the verdict. Procedure:\n"
+    "tools/docs/background/verdict.md.\n";
 
 struct settings {
     struct compare_job job;
@@ -40,74 +41,76 @@ static bool read_curve(void *settings, const char *const v[4], struct err *e)
 
 static const struct cli_option options[] = {
     {0, "alpha", "A",
-     "chance of a wrong DIFFERENT, and of a wrong EQUIVALENT, 1e-12 to\n"
-     "0.4 (1e-3)",
+     "probability of a wrong DIFFERENT, and of a wrong EQUIVALENT, 1e-12\n"
+     "to 0.4 (1e-3)",
      TO(job.opt.alpha), 1e-12, 0.4},
     {0, "margin", "D",
-     "largest relative difference of the image mean that\n"
-     "counts as equal. Without it nothing is EQUIVALENT: any\n"
-     "difference is looked for, and what could have been missed is\n"
-     "said",
+     "equivalence margin: largest relative difference of the image mean\n"
+     "that counts as equal. Without a margin the verdict is never\n"
+     "EQUIVALENT: any difference is tested for, and the minimum\n"
+     "detectable difference is printed",
      TO(job.opt.margin_global), 0, 0.99},
     {0, "margin-tile", "D", "the same for one tile (4 x --margin)", TO(job.opt.margin_tile), 0,
      0.99},
     {0, "margin-variance", "D",
-     "the same for the variance of one sample or replicate;\n"
-     "without it variances are not judged",
+     "the same for the variance of one sample or replicate; without it\n"
+     "variances are not judged",
      TO(job.opt.margin_variance), 0, 100},
     {0, "accept-mdb", "X",
-     "without --margin: exit code 0 if nothing is found and an\n"
-     "error of X of the image (relative) could not have been missed",
+     "without --margin: exit code 0 if no difference is found and the\n"
+     "minimum detectable bias (MDB, relative) of the image is at most X",
      TO(job.accept_mdb[0]), 1e-9, 1000},
-    {0, "accept-mdb-tile", "X", "the same for one tile (4 x --accept-mdb)", TO(job.accept_mdb[1]),
-     1e-9, 1000},
+    {0, "accept-mdb-tile", "X", "the same for the MDB of one tile (4 x --accept-mdb)",
+     TO(job.accept_mdb[1]), 1e-9, 1000},
     {0, "tile", "N", "side of a reporting tile, pixels (16)", TO(job.opt.tile), 1, 65536},
     {0, "again", "A2 B2",
-     "the same renders with fresh seeds: DIFFERENT only if they\n"
-     "confirm what A and B show, each stage at the root of alpha",
+     "the same renders with fresh seeds: DIFFERENT only if they confirm\n"
+     "what A and B show; each stage is tested at sqrt(alpha)",
      TO(job.again)},
     {0, "paired", "",
-     "A and B share their noise (one seed, two versions of a\n"
-     "program): it is taken from A - B, so that far less shows",
+     "A and B have correlated noise (same seed, two versions of a\n"
+     "program): estimate it from A - B, which shows smaller differences",
      TO(job.paired)},
     {0, "exchangeable", "",
-     "A and B are directories of replicates of what should be the\n"
-     "same program: an exact test by permutation, without margins",
+     "exact permutation test: A and B are directories of replicates of\n"
+     "what should be the same program; takes no margins",
      TO(job.exchangeable)},
     {0, "same-program", "",
-     "A and B are renders of equally many samples by two versions\n"
-     "of one program, one each or directories: DIFFERENT if the law\n"
-     "of any pixel has changed, exactly at any alpha, under\n"
-     "fireflies, from 1 sample on and of PNGs without --curve; a\n"
-     "better sampler changes it too. What the means by themselves\n"
-     "say, with --margin as ever, is a note",
+     "exact sign-flip test: A and B are renders with equal spp by two\n"
+     "versions of one program, one image each or directories. DIFFERENT\n"
+     "if the distribution of any pixel changed, which a better sampler\n"
+     "also does. Valid at any alpha, under fireflies, from 1 spp, for\n"
+     "PNGs without --curve. The comparison of the means, with --margin\n"
+     "if given, is reported as a note",
      TO(job.same_program)},
     {0, "filter-width", "N",
-     "of that test: pixels less than N apart may share noise, as\n"
-     "by a filter N pixels wide; one in N x N is judged (all, which\n"
-     "is INCONCLUSIVE where they look as if they shared noise)",
+     "for --same-program: pixels closer than N may share noise, as with a\n"
+     "pixel filter N wide; only one in N x N is tested (all; if they\n"
+     "seem to share noise: INCONCLUSIVE)",
      TO(job.filter_width), 1, 1000},
-    {0, "min-side", "N", "smallest region of --exchangeable, pixels (about 1/32 of the image)",
+    {0, "min-side", "N",
+     "side of the smallest region of --exchangeable, pixels (about 1/32 of\n"
+     "the image)",
      TO(job.min_side), 1, 65536},
     {0, "curve", "CURVE",
-     "of PNG files, from light to code: srgb, linear, gamma=G\n"
-     "(G in 0.2 to 5), or cgl, the assignment's",
+     "encoding curve of PNG files (radiance to code): srgb, linear,\n"
+     "gamma=G (G in 0.2 to 5), or cgl, the assignment's",
      .read = read_curve},
-    {0, "spp-a", "N", "samples per pixel of A, if its file has a variance only",
+    {0, "spp-a", "N", "samples per pixel of A, if its file only states a variance",
      TO(job.input[0].spp), 3, 1e12},
     {0, "spp-b", "N", "the same for B", TO(job.input[1].spp), 3, 1e12},
     {0, "expect", "VERDICT",
-     "what exit code 0 stands for (EQUIVALENT; with --accept-mdb\n"
+     "verdict that gives exit code 0 (EQUIVALENT; with --accept-mdb\n"
      "NO DIFFERENCE FOUND)",
      TO(expect), .names = verdict_names},
-    {0, "title", "TEXT", "heading of the page", TO(job.title)},
-    {0, "name-a", "NAME", "what page and results call A (its path)", TO(job.name[0])},
+    {0, "title", "TEXT", "heading of the HTML page", TO(job.title)},
+    {0, "name-a", "NAME", "label of A in page and results (its path)", TO(job.name[0])},
     {0, "name-b", "NAME", "the same for B", TO(job.name[1])},
-    {0, "json", "FILE", "write the claim as results.json", TO(json)},
-    {'t', "threads", "N", "0: one per processor (0); the same numbers with any",
+    {0, "json", "FILE", "write the result as a results.json", TO(json)},
+    {'t', "threads", "N", "number of threads; 0: one per processor (0); no effect on results",
      TO(job.opt.threads), 0, 1024},
-    {'r', "report", "FILE", "write the claim as one HTML page with its images", TO(report)},
-    {'q', "quiet", "", "print nothing; the exit code says it", TO(quiet)},
+    {'r', "report", "FILE", "write the result and its images as one HTML page", TO(report)},
+    {'q', "quiet", "", "print nothing; only return the exit code", TO(quiet)},
     {'h', "help", "", "print this", TO(help), .usage = usage},
     {.args = "two images", CLI_TO_LIST(struct settings, job.path, num_paths)}};
 

@@ -52,42 +52,49 @@ static bool read_engine(void *options, const char *const v[4], struct err *e)
 static const struct cli_option options[] = {
     {0, "engine", "NAME",
      "one of pathtracer pathtracer-sobol" ENGINES_WITH_GOLDENS(
-         ENGINE_TEXT) "; may be given\nagain (the first three)",
+         ENGINE_TEXT) "; repeatable\n(the first three)",
      .read = read_engine},
     {0, "ladder", "N,N,...",
      "samples per pixel of the rungs, ascending; povray needs squares\n"
      "(1,4,16,64,256)",
      .read = read_ladder},
-    {'k', "replicates", "K", "images per rung, each with its own seed (16)", TO(replicates), 4,
-     CONVERGE_MAX_REPLICATES},
+    {'k', "replicates", "K", "replicates per rung, each with a different seed (16)", TO(replicates),
+     4, CONVERGE_MAX_REPLICATES},
     {0, "depth-spp", "N",
-     "samples per pixel of the depth ladder, pathtracer's image at every greatest\n"
-     "depth up to the scene's; 0: none (64)",
+     "samples per pixel of the depth ladder: a pathtracer render for each\n"
+     "maximum path depth up to the scene's; 0: no depth ladder (64)",
      TO(depth_spp), 0, 1 << 20},
-    {0, "shrink", "N", "images N times smaller on both sides (1)", TO(shrink), 1, 1024},
+    {0, "shrink", "N", "divide width and height of the images by N (1)", TO(shrink), 1, 1024},
     {0, "reference", "NAME",
-     "what errors are measured against: truth (closed form), an engine's golden,\n"
-     "own (a long run of pathtracer), or auto: the first there is",
+     "reference of the errors: truth (closed form), an engine's stored\n"
+     "reference, own (a long pathtracer render), or auto: the first of\n"
+     "these that exists (auto)",
      TO(against), .names = converge_against_names},
     {0, "alpha", "A",
-     "chance of any wrong verdict in the whole run, for wrong\n"
-     "DIFFERENT and for wrong EQUIVALENT each (1e-3)",
+     "probability of any wrong verdict in the whole run, for DIFFERENT\n"
+     "and for EQUIVALENT each (1e-3)",
      TO(alpha), 1e-12, 0.4},
-    {0, "margin", "M", "RMS over the pixels of the relative bias that counts as none (0.01)",
+    {0, "margin", "M", "largest RMS over pixels of the relative bias that passes (0.01)",
      TO(margin), 1e-6, 1},
-    {0, "slope-margin", "M", "a slope known to no better than +-M decides nothing (0.1)",
+    {0, "slope-margin", "M",
+     "INCONCLUSIVE if the confidence interval of a slope contains -1/2 but\n"
+     "is wider than +-M (0.1)",
      TO(slope_margin), 1e-6, 1},
-    {0, "seed", "N", "all seeds follow from it (1)", TO(seed)},
-    {'o', "out", "DIR", "results.json and index.html (build/converge)", TO(out_dir)},
-    {0, "suite", "DIR", "the scenes (reference/scenes)", TO(suite_dir)},
-    {0, "golden", "DIR", "stored references (golden)", TO(golden_dir)},
-    {0, "share", "DIR", "where cycles.py is (reference)", TO(share_dir)},
-    {0, "pathtracer", "FILE", "the program under test (beside this one)", TO(pathtracer)},
-    {'t', "threads", "N", "0: one per processor (0)", TO(threads), 0, 1024},
-    {0, "timeout", "S", "seconds for any one program (3600)", TO(timeout_s), 1, 1e6},
-    {'q', "quiet", "", "no progress", TO(quiet)},
+    {0, "seed", "N", "base seed from which all seeds are derived (1)", TO(seed)},
+    {'o', "out", "DIR", "output directory: results.json, index.html (build/converge)", TO(out_dir)},
+    {0, "suite", "DIR", "directory of scenes (reference/scenes)", TO(suite_dir)},
+    {0, "golden", "DIR", "directory of stored references (golden)", TO(golden_dir)},
+    {0, "share", "DIR", "directory of cycles.py (reference)", TO(share_dir)},
+    {0, "pathtracer", "FILE", "program under test (pathtracer beside this program)",
+     TO(pathtracer)},
+    {'t', "threads", "N", "number of threads; 0: one per processor (0)", TO(threads), 0, 1024},
+    {0, "timeout", "S", "time limit for each program run, seconds (3600)", TO(timeout_s), 1, 1e6},
+    {'q', "quiet", "", "print no progress", TO(quiet)},
     {'h', "help", "", "print this", TO(help),
-     .usage = "usage: assay converge [options] SCENE...\n"},
+     .usage =
+         "usage: assay converge [options] SCENE...\n\n"
+         "Renders each scene at increasing sample counts, with several seeds each, and measures how the\n"
+         "error falls.\n"},
     {.noun = "scenes", CLI_TO_LIST(struct converge_options, scene, num_scenes)}};
 
 static bool write_all(const json_t *results, const char *out_dir, struct err *e)

@@ -25,20 +25,21 @@ struct settings {
 #define TO(member) CLI_TO(struct settings, member)
 
 static const struct cli_option options[] = {
-    {0, "pathtracer", "PROGRAM", "the renderer to look at (the one beside this program)",
+    {0, "pathtracer", "PROGRAM", "program under test (pathtracer beside this program)",
      TO(pathtracer)},
-    {0, "scene", "VIEW", "what the image shows: one of the views below", TO(view)},
-    {0, "json", "FILE", "write the diagnosis as JSON too", TO(json)},
-    {0, "alpha", "A", "chance of accusing a correct renderer (1e-6)", TO(diagnose.alpha), 1e-12,
-     0.1},
-    {0, "seed", "N", "of the renders (1)", TO(seed)},
-    {0, "without", "BUG", "leave a bug out, as if it were not known", TO(diagnose.without)},
-    {0, "catalogue", "DIR", "the stored effects of bugs (golden/diagnose)", TO(catalogue_dir)},
-    {0, "suite", "DIR", "the scenes (reference/scenes)", TO(suite_dir)},
-    {'t', "threads", "N", "threads of a render; 0: all processors (0)", TO(threads), 0, 1024},
-    {0, "timeout", "S", "seconds that one render may take (600)", TO(timeout_s), 1, 1e6},
-    {'q', "quiet", "", "print nothing; the exit code says it", TO(quiet)},
-    {'h', "help", "", "print this, and the views", TO(help), .stops = true},
+    {0, "scene", "VIEW", "the view that X.exr shows, one of those listed below", TO(view)},
+    {0, "json", "FILE", "also write the diagnosis as JSON", TO(json)},
+    {0, "alpha", "A", "false-positive rate: chance of accusing a correct renderer (1e-6)",
+     TO(diagnose.alpha), 1e-12, 0.1},
+    {0, "seed", "N", "seed of the renders (1)", TO(seed)},
+    {0, "without", "BUG", "exclude BUG from the known bugs", TO(diagnose.without)},
+    {0, "catalogue", "DIR", "directory of the stored effects of known bugs (golden/diagnose)",
+     TO(catalogue_dir)},
+    {0, "suite", "DIR", "directory of scenes (reference/scenes)", TO(suite_dir)},
+    {'t', "threads", "N", "threads per render; 0: one per processor (0)", TO(threads), 0, 1024},
+    {0, "timeout", "S", "time limit for each render, seconds (600)", TO(timeout_s), 1, 1e6},
+    {'q', "quiet", "", "print nothing; only return the exit code", TO(quiet)},
+    {'h', "help", "", "print this and the list of views", TO(help), .stops = true},
     {.args = "one file", TO(input)}};
 
 /* Rules between options. */
@@ -53,20 +54,18 @@ static bool check(const struct settings *s, struct err *e)
 static void print_help(const struct catalogue *c)
 {
     cli_print_help(
-        "usage: assay diagnose [options]                       render the views and look at them\n"
+        "usage: assay diagnose [options]                       render the views and examine them\n"
         "       assay diagnose [options] results.json          the images of a validation\n"
         "       assay diagnose [options] --scene VIEW X.exr    one moments image\n\n"
-        "Names the known bug that explains how images differ from the correct ones.\n",
+        "Identifies the known bug that explains how images differ from the correct ones.\n",
         options);
     puts(
-        "\nviews, the size of their renders, and what the width of any other image of the same shape "
-        "has\nto be a multiple of:");
+        "\nViews, with size and spp of their renders. X.exr may have another size with the same aspect\n"
+        "ratio, if its width is a multiple of the last number:");
     for (int i = 0; i < c->num_views; i++)
         printf("  %-36s %d x %d, %d spp, %d\n", c->view[i].name, c->view[i].width,
                c->view[i].height, c->view[i].spp, c->view[i].correct.columns);
-    puts(
-        "\nExit code: 0 nothing wrong found, 1 a bug named or wrong in an unknown way, 3 could not\n"
-        "judge.");
+    puts("\nExit code: 0 no bug found, 1 a known or an unknown bug found, 3 could not judge.");
 }
 
 static bool gather(const struct settings *s, const struct diagnose_gather_options *g,

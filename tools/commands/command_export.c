@@ -39,17 +39,20 @@ static bool read_engine(void *settings, const char *const v[4], struct err *e)
 #define TO(member) CLI_TO(struct settings, member)
 
 static const struct cli_option options[] = {
-    {'o', "out", "FILE", "required; its ending says which engine's:\n" ENGINES(ENGINE_ENDING),
-     TO(out)},
-    {0, "engine", "NAME", "one of" ENGINES(ENGINE_TEXT) " (by the ending of --out)",
+    {'o', "out", "FILE",
+     "output file, required; its ending selects the engine:\n" ENGINES(ENGINE_ENDING), TO(out)},
+    {0, "engine", "NAME", "one of" ENGINES(ENGINE_TEXT) " (chosen by the ending of --out)",
      .read = read_engine},
-    {'r', "resolution", "W H", "pixels (480 360)", TO(width), 1, 65535},
-    {'m', "max-bounces", "N", "as pathtracer counts them (5)", TO(depth), 0, 10000},
-    {'e', "environment", "FILE", "as pathtracer's", TO(environment)},
-    {'b', "lens-radius", "R", "as pathtracer's; 0: pinhole (0)", TO(lens_radius), 0, 1e6},
-    {'d', "focal-distance", "D", "as pathtracer's (4.7)", TO(focal_distance), 1e-6, 1e9},
+    {'r', "resolution", "W H", "image size in pixels (480 360)", TO(width), 1, 65535},
+    {'m', "max-bounces", "N", "maximum bounces, counted as by pathtracer (5)", TO(depth), 0, 10000},
+    {'e', "environment", "FILE", "environment map, as for pathtracer (none)", TO(environment)},
+    {'b', "lens-radius", "R", "lens radius, as for pathtracer; 0: pinhole (0)", TO(lens_radius), 0,
+     1e6},
+    {'d', "focal-distance", "D", "focal distance, as for pathtracer (4.7)", TO(focal_distance),
+     1e-6, 1e9},
     {'h', "help", "", "print this", TO(help),
-     .usage = "usage: assay export [options] -o OUT SCENE.dae\n"},
+     .usage = "usage: assay export [options] -o OUT SCENE.dae\n\n"
+              "Converts a COLLADA scene for another renderer.\n"},
     {.args = "one scene", TO(scene)}};
 
 static bool choose_engine(struct settings *s, struct err *e)

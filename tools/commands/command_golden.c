@@ -24,25 +24,28 @@ struct settings {
 
 static const struct cli_option options[] = {
     {0, "all", "",
-     "approve every reference of the suite, or of the names given, but\n"
+     "approve all references of the suite (or of the names given), except\n"
      "those that are up to date and have no candidate",
      TO(all)},
-    {0, "from", "DIR", "candidates (build/golden-candidate)", TO(opt.from_dir)},
-    {0, "golden", "DIR", "stored references (golden; of a suite.json golden beside it)",
+    {0, "from", "DIR", "directory of candidates (build/golden-candidate)", TO(opt.from_dir)},
+    {0, "golden", "DIR",
+     "directory of stored references (golden; with a suite.json, golden\n"
+     "beside it)",
      TO(opt.golden_dir)},
     {0, "suite", "DIR",
-     "the scenes (that of the folder, if it has a suite.json, else\n"
+     "directory of scenes (current directory if it has a suite.json, else\n"
      "reference/scenes)",
      TO(suite_dir)},
-    {0, "new", "", "approve also where nothing is stored", TO(opt.accept_new)},
-    {0, "accept-difference", "WHY", "approve also what is DIFFERENT; WHY goes into the manifest",
-     TO(opt.why)},
-    {0, "alpha", "A", "chance of any wrong verdict in this run (1e-3)", TO(opt.alpha), 1e-12, 0.4},
+    {0, "new", "", "also approve candidates for which no reference is stored", TO(opt.accept_new)},
+    {0, "accept-difference", "WHY",
+     "also approve candidates that are DIFFERENT; the manifest records WHY", TO(opt.why)},
+    {0, "alpha", "A", "probability of any wrong verdict in this run (1e-3)", TO(opt.alpha), 1e-12,
+     0.4},
     {'h', "help", "", "print this", TO(help),
      .usage =
-         "usage: assay golden render [options]          candidates (see assay golden render --help)\n"
-         "       assay golden status [options]          what is stored, and what is wrong with it\n"
-         "       assay golden compare [options] [SCENE | SCENE/ENGINE] ...  candidates against what is stored\n"
+         "usage: assay golden render [options]          renders candidates (see assay golden render --help)\n"
+         "       assay golden status [options]          lists stored references and their problems\n"
+         "       assay golden compare [options] [SCENE | SCENE/ENGINE] ...  candidates with stored references\n"
          "       assay golden approve [options] [--all] [SCENE | SCENE/ENGINE | SCENE/noise] ...\n"},
     {.noun = "names", CLI_TO_LIST(struct settings, names, num_names)}};
 

@@ -19,8 +19,8 @@ static const struct cli_option options[] = {
     {'h', "help", "", "print this", CLI_TO(struct settings, help),
      .usage =
          "usage: assay init [DIR]\n\n"
-         "Writes a suite of your own into DIR (the current folder): a scene, how to call your renderer,\n"
-         "what it is held against, a CI file, and a README that says what to do next.\n"},
+         "Creates a test suite for your own renderer in DIR (the current directory): a scene, the command\n"
+         "that runs your renderer, a reference, a CI file, and a README with the next steps.\n"},
     {.noun = "folders", CLI_TO_LIST(struct settings, dir, num_dirs)}};
 
 int command_init(int argc, char **argv, struct err *e)

@@ -22,21 +22,20 @@ static const char *const by[] = {"scene", "claim", NULL};
 #define TO(member) CLI_TO(struct words, member)
 
 static const struct cli_option options[] = {
-    {0, "plan", "DIR", "where the plan and its jobs are kept (OUTPUT.plan)", TO(dir)},
+    {0, "plan", "DIR", "directory of the plan and its jobs (OUTPUT.plan)", TO(dir)},
     {0, "parts", "N",
-     "into about how many cells a render is cut, or how many jobs\n"
+     "approximate number of cells of a render, or number of jobs for\n"
      "references (64)",
      TO(wish.parts), 1, 1000000},
     {0, "ranges", "R",
-     "each cell into R sample ranges, a job each; at most one for each\n"
-     "sample. Their sums are added up, so that the image is that of\n"
-     "one render to rounding, not to the bit; the same bits for the\n"
-     "same R whatever the cells and the order; not with --adaptive and\n"
-     "--keep-state (1)",
+     "for a render: split each cell into R sample ranges, one job each; at\n"
+     "most one per sample. The image then equals a single render up to\n"
+     "rounding, and its bits depend only on R, not on cells or job order.\n"
+     "Not with --adaptive or --keep-state (1)",
      TO(wish.ranges), 1, 1000000},
     {0, "by", "WHAT",
-     "a validation: scene, a job for each scene, whose claims share its\n"
-     "renders; claim, a job for each claim, each of which renders what it\n"
+     "for a validation: scene, one job per scene, whose claims share its\n"
+     "renders; or claim, one job per claim, each of which renders what it\n"
      "needs itself (scene)",
      TO(wish.by), PLAN_BY_SCENE, .names = by},
     {'h', "help", "", "print this", TO(help), .stops = true},
@@ -59,9 +58,9 @@ int command_plan(int argc, char **argv, struct err *e)
     if (w.help) {
         print_help(
             "plan",
-            "Cuts the command into jobs, writes DIR/plan.jsonl and prints it: a line for all, "
-            "then one for each job.\nassay run-job DIR K... runs some, assay gather DIR "
-            "puts them together to what the command\nwould have left.\n");
+            "Splits the command into jobs, writes DIR/plan.jsonl and prints it: a header line, then one line\n"
+            "per job. `assay run-job DIR K...` runs jobs, `assay gather DIR` combines their results into the\n"
+            "output of the command.\n");
         return 0;
     }
     if (!plan_make(w.dir, argc - w.first, argv + w.first, &w.wish, &p, e))
@@ -104,7 +103,7 @@ int command_run_job(int argc, char **argv, struct err *e)
     if (!open_plan(
             argc, argv,
             "usage: assay run-job PLAN K...\n\n"
-            "Runs jobs of a plan by number, from 0. What is made and whole is not made again.",
+            "Runs the jobs K... of a plan, numbered from 0. Jobs with an intact result are not run again.",
             &p, &code, e))
         return code;
     for (int i = 2; i < argc && failed == 0; i++) {
@@ -140,8 +139,8 @@ int command_gather(int argc, char **argv, struct err *e)
     if (!open_plan(
             argc, argv,
             "usage: assay gather PLAN\n\n"
-            "Puts the jobs of a plan together to what its command would have left, and ends with\n"
-            "its exit code.",
+            "Combines the results of a plan's jobs into the output of its command, and returns that\n"
+            "command's exit code.",
             &p, &code, e))
         return code;
     if (argc > 2)
@@ -177,11 +176,12 @@ int command_slurm(int argc, char **argv, struct err *e)
     if (!cli_read(options, argc, argv, &w, e))
         return EXIT_NOT_JUDGED;
     if (w.help) {
-        print_help("slurm",
-                   "Plans the command, runs its jobs as arrays of a Slurm cluster that sees these "
-                   "files, submits again what is\nlost, and gathers. Where sbatch reads SBATCH_... "
-                   "from the environment, that is how to choose a partition\nor a time limit. "
-                   "Begun again it goes on.\n");
+        print_help(
+            "slurm",
+            "Plans the command, runs its jobs as job arrays on a Slurm cluster whose nodes see the same\n"
+            "files, resubmits lost jobs, and gathers the results. Set partition and time limit by the\n"
+            "environment variables of sbatch (SBATCH_...). After an interruption, run the same command\n"
+            "again to continue.\n");
         return 0;
     }
     return command_slurm_run(w.dir, argc - w.first, argv + w.first, &w.wish, e);

@@ -30,10 +30,11 @@ static bool read_word(void *settings, const char *const v[4], struct err *e)
 
 static const struct cli_option options[] = {
     {'h', "help", "", "print this", CLI_TO(struct settings, help),
-     .usage = "usage: assay merge OUT.exr SHARE.exr SHARE.exr ...\n\n"
-              "Adds images that pathtracer rendered of one scene with --samples A:B or -p:\n"
-              "samples of the same cell, cells of the same samples. Refuses what overlaps and\n"
-              "what is not of the same image.\n"},
+     .usage =
+         "usage: assay merge OUT.exr SHARE.exr SHARE.exr ...\n\n"
+         "Combines partial renders of one image that pathtracer made with --samples A:B or -p:\n"
+         "sample ranges of the same cell, or cells with the same samples. Refuses parts that\n"
+         "overlap or belong to different images.\n"},
     {.read = read_word}};
 
 int command_merge(int argc, char **argv, struct err *e)

@@ -21,25 +21,28 @@ struct settings {
 #define TO(member) CLI_TO(struct settings, member)
 
 static const struct cli_option options[] = {
-    {'o', "out", "FILE", "the page (index.html beside the results)", TO(out)},
-    {0, "markdown", "", "no page; print the verdict table as Markdown", TO(markdown)},
+    {'o', "out", "FILE", "the HTML page (index.html beside the results)", TO(out)},
+    {0, "markdown", "", "print the verdict table as Markdown instead of writing a page",
+     TO(markdown)},
     {0, "matrix", "",
-     "the same, a row for each scene: ours against each reference,\n"
-     "and with convergence its slopes, biases and ratios to Cycles",
+     "the same, with one row per scene: ours against each reference, and\n"
+     "with convergence its slopes, biases and ratios to Cycles",
      TO(matrix)},
-    {0, "converge", "FILE", "results.json of `assay converge`, to go into the same page or table",
+    {0, "converge", "FILE", "results.json of `assay converge`, to add to the same page or table",
      TO(converge)},
     {0, "github", "",
-     "no page; print workflow commands of GitHub Actions that annotate what is\n"
-     "not as expected, and add the headline and the verdict table to the file\n"
-     "that GITHUB_STEP_SUMMARY names",
+     "instead of a page, print GitHub Actions annotations for unexpected\n"
+     "results, and append headline and verdict table to the file named by\n"
+     "GITHUB_STEP_SUMMARY",
      TO(github)},
     {0, "history", "DIR",
-     "instead: a page of all results.json in and below DIR, against time\n"
-     "(DIR/history.html); exit code 1 if the last run has moved",
+     "instead, plot all results.json in and below DIR over time (page\n"
+     "DIR/history.html); exit code 1 if the last run differs significantly\n"
+     "from the earlier ones",
      TO(history)},
     {'h', "help", "", "print this", TO(help),
-     .usage = "usage: assay report [options] RESULTS.json\n"},
+     .usage = "usage: assay report [options] RESULTS.json\n\n"
+              "Writes the HTML page of a results.json, or prints its tables.\n"},
     {.args = "one results file", TO(results)}};
 
 static void print_markdown(FILE *f, const json_t *results, bool headline)

@@ -16,22 +16,22 @@ struct settings {
 #define TO(member) CLI_TO(struct settings, member)
 
 static const struct cli_option options[] = {
-    {0, "scene", "FILE", "where the scene is now (as the file says)", TO(opt.scene)},
-    {0, "pathtracer", "FILE", "the renderer (the one beside this program)", TO(opt.pathtracer)},
-    {0, "keep", "FILE", "write what was made again", TO(opt.keep)},
-    {'t', "threads", "N", "0: one per processor (0)", TO(opt.threads), 0, 1024},
+    {0, "scene", "FILE", "current path of the scene (as recorded in FILE)", TO(opt.scene)},
+    {0, "pathtracer", "FILE", "the renderer (pathtracer beside this program)", TO(opt.pathtracer)},
+    {0, "keep", "FILE", "save the reproduced file as this", TO(opt.keep)},
+    {'t', "threads", "N", "number of threads; 0: one per processor (0)", TO(opt.threads), 0, 1024},
     {0, "run-foreign", "",
-     "run other programs than ours that results.json names, too:\n"
+     "also run programs other than ours that results.json names:\n"
      "--pathtracer, --engine FILE, --share; refused otherwise",
      TO(opt.run_foreign)},
     {'h', "help", "", "print this", TO(help),
      .usage =
          "usage: assay reproduce [options] FILE\n\n"
-         "Makes a file again by what it says of its origin, and compares.\n"
+         "Reproduces a file from the provenance recorded in it, and compares the two.\n"
          "  a render of pathtracer or of `assay merge` (EXR): all values bit by bit\n"
-         "  a stored reference (golden/SCENE/ENGINE.exr): the same, by the engine; it must be installed\n"
-         "  results.json of validate, compare and converge: all values but dates and times\n"
-         "Exit code: 0 the same, 1 not, 3 cannot be made again (one line on stderr).\n"},
+         "  a stored reference (golden/SCENE/ENGINE.exr): the same, by the engine, which must be installed\n"
+         "  results.json of validate, compare and converge: all values except dates and times\n"
+         "Exit code: 0 identical, 1 different, 3 could not be reproduced (one line on stderr).\n"},
     {.args = "one file", TO(path)}};
 
 int command_reproduce(int argc, char **argv, struct err *e)

@@ -10,42 +10,46 @@
 #define TO(member) CLI_TO(struct reference_command, member)
 
 static const struct cli_option options[] = {
-    {0, "only", "SCENE", "only this scene; may be given again",
+    {0, "only", "SCENE", "render only this scene; repeatable",
      CLI_TO_LIST(struct reference_command, only, num_only), .noun = "scenes"},
     {0, "engine", "NAME|FILE",
-     "only one engine's, of" ENGINES_WITH_GOLDENS(
+     "render only this engine's references, one of" ENGINES_WITH_GOLDENS(
          ENGINE_TEXT) ";\n"
-                      "with --noise also pathtracer, pathtracer-sobol; FILE.json:\n"
-                      "any renderer's, for the reference --as NAME of a suite.json",
+                      "with --noise also pathtracer, pathtracer-sobol; FILE.json: any\n"
+                      "renderer, for the reference --as NAME of a suite.json",
      TO(engine)},
     {0, "as", "NAME",
-     "with --engine FILE.json: which reference it makes (the one that\n"
-     "is called as the engine, or as it and -VERSION)",
+     "with --engine FILE.json: the reference that it renders (the one named\n"
+     "like the engine, or like the engine with -VERSION)",
      TO(as)},
     {0, "noise", "",
-     "not the images, but how noisy each engine is, ours too: the\n"
-     "variance of a sample, and its fall over 1, 4, 16, 64 samples",
+     "instead of references, measure the noise of each engine, ours too:\n"
+     "variance per sample, and its decrease over 1, 4, 16, 64 samples",
      TO(noise)},
-    {'o', "out", "DIR", "where they go (build/golden-candidate)", TO(out)},
-    {0, "golden", "DIR", "leave out what is stored there and up to date", TO(golden)},
-    {0, "fresh", "", "render also what is there and up to date", TO(fresh)},
+    {'o', "out", "DIR", "output directory (build/golden-candidate)", TO(out)},
+    {0, "golden", "DIR", "skip references that are stored in DIR and up to date", TO(golden)},
+    {0, "fresh", "", "also render references that exist and are up to date", TO(fresh)},
     {0, "images", "A:B",
-     "of one reference, images A to B-1 alone, unfolded, into DIR: of\n"
-     "Cycles its replicates, of POV-Ray 32 windows without noise, then\n"
-     "its replicates; what a job of assay plan does",
+     "render only images A to B-1 of one reference, and do not combine\n"
+     "them: for Cycles its replicates; for POV-Ray 32 noise-free windows,\n"
+     "then its replicates. Used by the jobs of assay plan",
      CLI_TO_RANGE(struct reference_command, first), 0, INT32_MAX, .noun = "image"},
     {0, "suite", "DIR",
-     "the scenes (that of the folder, if it has a suite.json, else\n"
+     "directory of scenes (current directory if it has a suite.json, else\n"
      "reference/scenes)",
      TO(suite_dir)},
-    {0, "share", "DIR", "where cycles.py is (reference)", TO(opt.share_dir)},
-    {0, "work", "DIR", "temporary files (build/work)", TO(work)},
-    {0, "seed", "N", "seed of all replicates (that of what is stored, else 1)", TO(seed), 0,
+    {0, "share", "DIR", "directory of cycles.py (reference)", TO(opt.share_dir)},
+    {0, "work", "DIR", "directory for temporary files (build/work)", TO(work)},
+    {0, "seed", "N", "seed of all replicates (that of the stored reference, else 1)", TO(seed), 0,
      INT32_MAX},
-    {'t', "threads", "N", "0: one per processor (0)", TO(opt.threads), 0, 1024},
-    {0, "timeout", "S", "seconds for one engine and scene (7200)", TO(opt.timeout_s), 1, 1e6},
-    {0, "slurm", "", "jobs of some replicates each on a Slurm cluster", TO(slurm)},
-    {'h', "help", "", "print this", TO(help), .usage = "usage: assay reference [options]\n"},
+    {'t', "threads", "N", "number of threads; 0: one per processor (0)", TO(opt.threads), 0, 1024},
+    {0, "timeout", "S", "time limit for each engine and scene, seconds (7200)", TO(opt.timeout_s),
+     1, 1e6},
+    {0, "slurm", "", "run jobs of several replicates each on a Slurm cluster", TO(slurm)},
+    {'h', "help", "", "print this", TO(help),
+     .usage =
+         "usage: assay reference [options]\n\n"
+         "Renders references with Cycles, POV-Ray or your own renderer, as candidates for golden approve.\n"},
     {0}};
 
 /* Sets c->as to the reference that the described engine makes: --as NAME, else the one that is called as the

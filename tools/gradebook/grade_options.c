@@ -22,42 +22,51 @@ static bool read_word(void *settings, const char *const v[4], struct err *e)
 #define TO(member) CLI_TO(struct grade_settings, member)
 
 static const struct cli_option options[] = {
-    {0, "check-rubric", "", "name every mistake of the rubric with its line, and that is all",
+    {0, "check-rubric", "", "only check the rubric, and print each mistake with its line number",
      TO(only_check)},
-    {0, "prepare", "", "make the references in DIR, and that is all", TO(prepare)},
-    {0, "fill-build-cache", "",
-     "build SUBMISSION, the starter code, into --build-cache, and that is all", TO(fill)},
-    {0, "build-cache", "DIR", "a compiler cache (ccache) for the rubric's `build`, which reads it",
+    {0, "prepare", "", "only render the references, into DIR", TO(prepare)},
+    {0, "fill-build-cache", "", "only build STARTER_CODE, to fill --build-cache", TO(fill)},
+    {0, "build-cache", "DIR", "compiler cache (ccache) that the rubric's `build` reads",
      TO(build_cache)},
     {'o', "out", "DIR",
-     "where grades and pages go (grades); what is there already is not done again", TO(out)},
-    {'j', "jobs", "N", "submissions at a time; 0: as many as processors (1)", TO(jobs), 0, 64},
-    {'t', "threads", "N", "{threads} of a program (1)", TO(threads), 1, 1024},
-    {0, "seed", "N", "from which {seed} of each image is made (1)", TO(seed)},
+     "output directory for grades and pages; submissions already graded\n"
+     "there are skipped (grades)",
+     TO(out)},
+    {'j', "jobs", "N", "submissions graded in parallel; 0: one per processor (1)", TO(jobs), 0, 64},
+    {'t', "threads", "N", "number of threads of a program, {threads} in the rubric (1)",
+     TO(threads), 1, 1024},
+    {0, "seed", "N", "base seed from which each image's {seed} is derived (1)", TO(seed)},
     {0, "variant", "N",
-     "of the rubric's, which the class gets (drawn when the references are made, and kept there)",
+     "which of the rubric's variants the class gets (drawn at random when\n"
+     "the references are first made, then kept)",
      TO(variant), 1, 99},
-    {0, "alpha", "A", "chance of a check that a right program loses points (1e-5)", TO(alpha),
-     1e-12, 0.1},
-    {0, "again", "", "grade also what has been graded, and run anew what has been run", TO(again)},
+    {0, "alpha", "A",
+     "false-positive rate of a check: probability that a correct program\n"
+     "loses points (1e-5)",
+     TO(alpha), 1e-12, 0.1},
+    {0, "again", "", "also regrade submissions already graded, and rerun their programs",
+     TO(again)},
     {0, "before", "DIR",
-     "grades of an earlier run (those in OUT): what changed is listed, and programs are\n"
-     "not run again for images that the rubric asks for as it did then",
+     "grades of an earlier run (those in OUT): changes are listed, and\n"
+     "programs are rerun only for images that the rubric now specifies\n"
+     "differently",
      TO(before)},
-    {0, "appeals", "FILE", "points that staff decided, in lines of ID CHECK POINTS REASON",
-     TO(appeals)},
+    {0, "appeals", "FILE", "points set by staff, in lines of ID CHECK POINTS REASON", TO(appeals)},
     {0, "unsafe-no-sandbox", "",
-     "run programs without a sandbox: they can read and write all that you can\n"
-     "(as root: each by a user of its own; tools/docs/guide-course.md says what holds)",
+     "run programs without a sandbox, able to read and write all that you\n"
+     "can (as root: each under a separate user; what remains guaranteed:\n"
+     "tools/docs/guide-course.md)",
      TO(unsafe)},
-    {0, "pathtracer", "PROGRAM", "our renderer, for references (the one beside this program)",
+    {0, "pathtracer", "PROGRAM", "our renderer, for references (pathtracer beside this program)",
      TO(pathtracer)},
-    {0, "golden", "DIR", "stored references (golden)", TO(golden)},
-    {0, "suite", "DIR", "scenes (reference/scenes)", TO(suite)},
+    {0, "golden", "DIR", "directory of stored references (golden)", TO(golden)},
+    {0, "suite", "DIR", "directory of scenes (reference/scenes)", TO(suite)},
     {0, "references", "DIR",
-     "where the references are kept (.references in OUT, or in that of --before)", TO(references)},
-    {0, "slurm", "", "a job for each submission on a Slurm cluster", TO(slurm)},
-    {'q', "quiet", "", "no lines on submissions", TO(quiet)},
+     "where the rubric's references are kept (.references in OUT, or in\n"
+     "--before DIR)",
+     TO(references)},
+    {0, "slurm", "", "run one job per submission on a Slurm cluster", TO(slurm)},
+    {'q', "quiet", "", "print no line per submission", TO(quiet)},
     {'h', "help", "", "print this", TO(help), .stops = true},
     {.read = read_word}};
 
@@ -115,12 +124,12 @@ void grade_options_help(void)
         "       assay grade --check-rubric RUBRIC\n"
         "       assay grade --prepare [-o DIR] RUBRIC\n"
         "       assay grade --fill-build-cache --build-cache DIR RUBRIC STARTER_CODE\n\n"
-        "A submission is a directory of images, a program, or sources, also in an archive (.zip, .tar.gz), that the rubric\n"
-        "says how to build.\n"
-        "Programs run in a sandbox, without which nothing is graded.\n",
+        "A submission is a directory of images, a program, or source code, which is built as the rubric\n"
+        "says; also in an archive (.zip, .tar.gz).\n"
+        "Programs run in a sandbox; where there is none, nothing is graded.\n",
         options);
     puts(
-        "\nExit code: 0 all graded, 2 staff have to look at some, 3 could not grade (one line on stderr).");
+        "\nExit code: 0 all graded, 2 some need a look by staff, 3 could not grade (one line on stderr).");
 }
 
 struct grade_settings grade_options_default(int argc, struct data_dirs *at)

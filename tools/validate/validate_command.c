@@ -24,64 +24,75 @@ static bool read_reference_seed(void *command, const char *const v[4], struct er
 #define TO(member) CLI_TO(struct validate_command, member)
 
 static const struct cli_option options[] = {
-    {0, "live", "", "render the references now instead of reading the goldens", TO(opt.live)},
+    {0, "live", "", "render the references now instead of reading the stored ones", TO(opt.live)},
     {0, "only", "SCENE[/CLAIM]",
-     "judge only this scene, or of it only this claim: the name of the\n"
-     "reference that ours is held against, of a variant of ours, A:B\n"
-     "of any other pair, consistency, or noise; may be given again",
+     "judge only this scene, or only this claim of it: the name of a\n"
+     "reference (compared with ours) or of a variant of ours, A:B for\n"
+     "any other pair, consistency, or noise; repeatable",
      CLI_TO_LIST(struct validate_command, opt.only, opt.num_only), .noun = "scenes and claims"},
     {0, "alpha", "A",
-     "chance of any wrong verdict in the whole run, for wrong\n"
-     "DIFFERENT and for wrong EQUIVALENT each, down to 1e-12 (1e-3)",
+     "probability of any wrong verdict in the whole run, for DIFFERENT\n"
+     "and for EQUIVALENT each, 1e-12 to 0.4 (1e-3)",
      TO(opt.alpha), 1e-12, 0.4},
-    {'o', "out", "DIR", "report, results and images (build/report)", TO(opt.out_dir)},
+    {'o', "out", "DIR", "output directory: report, results, images (build/report)",
+     TO(opt.out_dir)},
     {0, "suite", "DIR",
-     "the scenes (that of the folder, if it has a suite.json, else\n"
+     "directory of scenes (current directory if it has a suite.json, else\n"
      "reference/scenes)",
      TO(opt.suite_dir)},
-    {0, "golden", "DIR", "stored references (golden; of a suite.json golden beside it)",
+    {0, "golden", "DIR",
+     "directory of stored references (golden; with a suite.json, golden\n"
+     "beside it)",
      TO(opt.golden_dir)},
-    {0, "share", "DIR", "where cycles.py is (reference)", TO(opt.share_dir)},
-    {0, "pathtracer", "FILE", "the program under test (beside this one)", TO(opt.pathtracer)},
+    {0, "share", "DIR", "directory of cycles.py and engines/ (reference)", TO(opt.share_dir)},
+    {0, "pathtracer", "FILE", "program under test (pathtracer beside this program)",
+     TO(opt.pathtracer)},
     {0, "engine", "FILE",
-     "also judge the renderer that this file describes: against\n"
-     "references and ours; a NAME alone is SHARE/engines/NAME.json",
+     "also judge the renderer described by FILE, against references and\n"
+     "ours; a bare NAME means SHARE/engines/NAME.json",
      TO(engine_file)},
-    {0, "engine-spp", "N", "its samples per pixel (as in its file)", TO(opt.engine_spp), 1,
+    {0, "engine-spp", "N", "samples per pixel of --engine (as in its file)", TO(opt.engine_spp), 1,
      1 << 24},
-    {0, "engine-replicates", "K", "its images (as in its file)", TO(opt.engine_replicates), 3,
-     4096},
-    {0, "seed", "N", "seed of our render (1)", TO(opt.seed)},
-    {0, "reference-seed", "N", "with --live (a fresh one), of --engine otherwise (0)",
+    {0, "engine-replicates", "K", "number of replicates of --engine (as in its file)",
+     TO(opt.engine_replicates), 3, 4096},
+    {0, "seed", "N", "seed of the renders by --pathtracer (1)", TO(opt.seed)},
+    {0, "reference-seed", "N", "with --live: seed of the references (random); else of --engine (0)",
      .read = read_reference_seed},
-    {'t', "threads", "N", "0: one per processor (0)", TO(opt.threads), 0, 1024},
-    {0, "timeout", "S", "seconds for any one program (3600)", TO(opt.timeout_s), 1, 1e6},
+    {'t', "threads", "N", "number of threads; 0: one per processor (0)", TO(opt.threads), 0, 1024},
+    {0, "timeout", "S", "time limit for each program run, seconds (3600)", TO(opt.timeout_s), 1,
+     1e6},
     {0, "budget", "T",
-     "look at each claim with more and more samples until it is\n"
-     "decided or the time is over: 90, 90s, 10m, 1h; alpha is spent\n"
-     "over the looks (off: one look at the declared samples)",
+     "judge each claim with more and more samples until it is decided\n"
+     "or this time is over: 90, 90s, 10m, 1h; alpha is divided among\n"
+     "the looks (off: one look at the declared samples)",
      TO(opt.budget_s), 0, 1e7, .unit = cli_time_units},
     {0, "stages", "1|2",
-     "2: DIFFERENT must be confirmed with fresh seeds, each stage at\n"
-     "sqrt(alpha), where both sides can be rendered again, so not\n"
-     "against goldens (2 if alpha < 1e-5, else 1)",
+     "2: DIFFERENT must be confirmed with fresh seeds, each stage tested\n"
+     "at sqrt(alpha), where both sides can be rendered again, so not\n"
+     "against stored references (2 if alpha < 1e-5, else 1)",
      TO(opt.stages), 1, 2},
     {0, "until-different", "",
-     "few samples first, then more, up to the declared; stop at the\n"
-     "first claim that differs where it should not",
+     "start with few samples, increase them to the declared number, and\n"
+     "stop at the first claim with an unexpected difference",
      TO(opt.until_different)},
-    {0, "of-claims", "N", "judge some of the N claims of a larger run, whose alpha it is (all)",
+    {0, "of-claims", "N",
+     "divide alpha among N claims, those of the larger run of which this\n"
+     "one judges a part (the claims judged)",
      TO(opt.of_claims), 1, 100000000},
     {0, "slurm", "",
-     "a job for each scene on a Slurm cluster (assay slurm --by claim\n"
-     "validate: for each claim)",
+     "run one job per scene on a Slurm cluster (one job per claim: assay\n"
+     "slurm --by claim validate)",
      TO(slurm)},
     {0, "page-every", "S",
-     "write the page every S seconds, with what is judged so far;\n"
-     "open in a browser it reloads itself until the run ends (off)",
+     "write the page with the results so far every S seconds; a browser\n"
+     "that shows it reloads it until the run ends (off)",
      TO(opt.show_every_s), 0.1, 1e6},
-    {'q', "quiet", "", "no progress", TO(opt.quiet)},
-    {'h', "help", "", "print this", TO(help), .usage = "usage: assay validate [options]\n"},
+    {'q', "quiet", "", "print no progress", TO(opt.quiet)},
+    {'h', "help", "", "print this", TO(help),
+     .usage =
+         "usage: assay validate [options]\n\n"
+         "Renders the scenes of a suite and judges each claim about them, mostly that a render agrees with\n"
+         "a reference.\n"},
     {0}};
 
 /* A suite of one's own names the engine that it judges; its references are stored. */
