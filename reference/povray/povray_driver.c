@@ -1,4 +1,4 @@
-/* The POV-Ray driver: renders the images of a povray_replicates in parallel. */
+/* The POV-Ray driver: renders the images of a povray_replicates in parallel; run_task() sums the passes of each. */
 #include "povray_replicates.h"
 #include "reference/base/process.h"
 

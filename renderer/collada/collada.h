@@ -7,7 +7,8 @@
 #include "renderer/scene/scene.h"
 
 /* Loads path into *out (which the caller frees with scene_free()). dialect AUTO decides from the
- * file. On failure *out is untouched and e has "path:line: what" (without a line where the whole
+ * file (xml_open() in collada_xml.c).
+ * On failure *out is untouched and e has "path:line: what" (without a line where the whole
  * file is meant). */
 NODISCARD bool collada_load(const char *path, enum dialect dialect, struct scene *out,
                             struct err *e);

@@ -114,7 +114,7 @@ static void set_samples(const struct rubric_image *p, const struct stopping *s, 
                         double *fact, double *fact_sd)
 {
     static const double ends =
-        4; /* half the range, in standard deviations: 3.3, and more for the shapes (stopping_rule.c) */
+        4; /* standard deviations in half the range: 3.3 of kappa, the shapes widen it (stopping_rule.c) */
     static const double least_sd = 0.1;
     double lo = progress(p, s->least), hi = progress(p, s->most);
     fact[FACT_SAMPLES] = fmin(fmax(seen, lo), hi);

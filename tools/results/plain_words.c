@@ -1,5 +1,7 @@
 #include "plain_words.h"
 
+#include "tools/compare/verdict.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -88,12 +90,14 @@ struct plain_words plain_words_claim(const json_t *claim)
     else if (strcmp(verdict, "EQUIVALENT") == 0)
         snprintf(w.s, sizeof w.s, "%.100s is the same%.110s (as %.100s), within %.3g %%", a,
                  scene.s, b, 100 * member_number(claim, "margin_global"));
-    else if (strcmp(verdict, "INCONCLUSIVE") == 0)
-        snprintf(w.s, sizeof w.s,
-                 "%.100s is too noisy to tell%.110s (against %.100s): about %.2g times the samples "
-                 "would decide",
-                 a, scene.s, b, fmax(1, member_number(claim, "extra_factor")));
-    else
+    else if (strcmp(verdict, "INCONCLUSIVE") == 0) {
+        const double factor = member_number(claim, "extra_factor"); /* 1: nobody knows */
+        char more[128] = "";
+        if (factor > 1)
+            verdict_more_samples(factor, "samples", more);
+        snprintf(w.s, sizeof w.s, "%.100s is too noisy to tell%.110s (against %.100s)%s%s", a,
+                 scene.s, b, factor > 1 ? ": " : "", more);
+    } else
         snprintf(
             w.s, sizeof w.s,
             "no difference of %.100s was found%.110s (against %.100s); %.3g %% would have been", a,

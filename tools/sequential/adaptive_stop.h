@@ -18,7 +18,8 @@ struct adaptive_stop {
     int too_early, too_late; /* pixels */
 };
 
-/* Checks a render with at most `most` samples a pixel. A pixel without light stops at once. */
+/* Checks a render with at most `most` samples a pixel. A black pixel may stop after any batch, or never;
+ * n > most counts as too late. */
 struct adaptive_stop adaptive_stop_check(const struct moments *m, int batch, double tolerance,
                                          int most);
 

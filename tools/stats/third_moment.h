@@ -8,8 +8,9 @@
  * of samples: v of n samples has a relative error of about 1/sqrt n. In units of V^1.5 the bound of a pixel is
  *     min((|sum r r'| + SE) / sum V^1.5, sqrt(R)), SE^2 = 4 sum (r r')^2, R = max(sum (vA - vB)^2 / sum V^2, own),
  * but at least sqrt(6/pixels)/n, the standard error of third moments of normal noise. own is the ratio of this pixel
- * alone, 1 for an outlier; R is at most 1, as a sample's third moment is at most its second to the power of 3/2. If
- * fewer than 16 pixels of a window have any variance, the sums are those of the image; if that has fewer, it is 1. */
+ * alone, near 1 for an outlier. R is at most 1, which is enough: sums of cubes are at most sums of squares to the power
+ * of 3/2, so that k3 of a mean is hardly above v^1.5. If fewer than 16 pixels of a window have any variance, the sums
+ * are those of the image; if the image has fewer, the bound is 1. */
 #ifndef ASSAY_THIRD_MOMENT_H
 #define ASSAY_THIRD_MOMENT_H
 

@@ -26,7 +26,7 @@ static long count, fail_at; /* of our own allocations while armed */
 static void *held[MOST_HELD];
 static atomic_int num_held;
 
-/* The sanitizers give memory back before they can look at anything. */
+/* Without checks: the sanitizers call free() before their own start-up is done. */
 #define BARE __attribute__((no_sanitize("address"), no_sanitize("undefined")))
 
 /* Asked for by the program itself, not by a library. */

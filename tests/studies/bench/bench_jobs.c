@@ -15,7 +15,7 @@
 #include <string.h>
 #include <unistd.h>
 
-/* CPU seconds of the course staff's program for the same job, 2019: ../shared/notes/performance.md. */
+/* CPU seconds of the course staff's program for the same job, 2019; NAN: none. */
 static const struct {
     const char *scene;
     double staff_s;
@@ -76,8 +76,8 @@ static bool paths_job(const struct bench_options *o, int i, json_t *jobs, struct
     return ok;
 }
 
-/* What brute force costs a camera ray over what the hierarchy does, by a few hundred rays in the
- * image's order for both. */
+/* What brute force costs a camera ray over what the hierarchy does: time per ray, the hierarchy's over all rays of the
+ * set, brute force's over every 997th. */
 static bool brute_force_factor(const struct bench_scene *s, const struct bvh *wide, double *factor,
                                struct err *e)
 {

@@ -24,7 +24,7 @@ static struct replicate_dir new_renders(int num, int width, int height)
 enum law_of_images {
     NORMAL,
     CORRELATED, /* one number shared by all pixels, as much as each has of its own */
-    FIREFLIES,  /* 0, but 1000 in 2 % of the pixels */
+    FIREFLIES,  /* up to 1, but up to 1000 in 2 % of the pixels */
     NUM_LAWS
 };
 
@@ -53,9 +53,8 @@ static struct permutation test_pair(const struct replicate_dir *a, const struct 
     return p;
 }
 
-/* |t|, two samples with pooled variance, of those of 8 pixels with a bit set in `labels`, from the
- * definition; the largest over the 4 + 1 squares (sides 1 and 2 of a 2 x 2 image). Grey, so channels
- * add nothing. */
+/* |t| (two samples, pooled variance, from the definition) of the images with a bit set in `labels` against the other
+ * three: the largest over the 4 + 1 squares (sides 1 and 2 of a 2 x 2 image). Grey, so channels add nothing. */
 static double largest_t(const double v[6][4], int labels)
 {
     double best = 0;
@@ -100,8 +99,8 @@ TEST(test_by_enumeration)
     }
 }
 
-/* 2/C(2K,K): 2/252, 2/924, 2/3432, 2/12870, 2/48620, 2/184756; 12 of a side are 2.7 million labellings, so
- * that 1/200001 is the least. */
+/* 2/C(2K,K) for K = 5 to 10: 2/252, 2/924, 2/3432, 2/12870, 2/48620, 2/184756. From K = 11 on labellings are drawn at
+ * random, so that 1/200001 is the least. */
 TEST(test_smallest)
 {
     assert_int_equal(permutation_needed(0.05, 2), 4);
@@ -141,8 +140,8 @@ static int count_rejected(enum law_of_images law, double scale, double alpha, in
 }
 
 /* H0 holds exactly: P(p <= 5 %) = 12/252 = 4.76 % (a multiple of 2/252, ties aside). 2000 pairs a law:
- * 95 expected, sd 9.5; two-sided chance 1e-3: 65 to 128. Fireflies tie where all is dark, so only the
- * upper end. Negative control: A brighter by a third must go beyond. */
+ * 95 expected, sd 9.5; two-sided chance 1e-3: 65 to 128. Of fireflies only the
+ * upper end is looked at. Negative control: A brighter by a third must go beyond. */
 TEST(test_level)
 {
     for (int law = 0; law < NUM_LAWS; law++) {
@@ -186,7 +185,7 @@ TEST(test_confirm)
     assert_int_equal(second.verdict, VERDICT_INCONCLUSIVE);
 }
 
-/* A tile that is off by its MDB is found with about 95 %, one by half of it hardly ever: of 60 each, below 50 has less
+/* A tile that is off by its MDB is found with about 95 %, one by half of it less often: of 60 each, below 50 has less
  * than 1e-3 at 95 %. Tiles of 4 in 8 x 8 pixels. */
 TEST(test_tile_mdb)
 {
@@ -209,8 +208,8 @@ TEST(test_tile_mdb)
     assert_true(found[0] >= 50 && found[1] < 45);
 }
 
-/* 10 a side are 184 756 labellings, 11 are 705 432 and drawn at random. Both must agree on what is far out,
- * and p of a random test is a multiple of 1/200 001. */
+/* 11 a side are 705 432 labellings, more than 200 000, so random ones are drawn: p is a multiple of 1/200 001, and what
+ * is far out is still found. */
 TEST(test_random_labellings)
 {
     uint64_t seed = 70;

@@ -44,6 +44,16 @@ TEST(who_how_much_and_where)
     assert_says(
         claim_of("INCONCLUSIVE", "EQUIVALENT", 0, 0, 0, 3),
         "mine is too noisy to tell on 12_point_plane (against truth): about 2.5 times the samples would decide");
+    /* The most that is said in numbers, and what nobody knows. */
+    json_t *most = claim_of("INCONCLUSIVE", "EQUIVALENT", 0, 0, 0, 3),
+           *unknown = json_deep_copy(most);
+    json_object_set_new(most, "extra_factor", json_real(100));
+    json_object_set_new(unknown, "extra_factor", json_real(1));
+    assert_says(
+        most,
+        "mine is too noisy to tell on 12_point_plane (against truth): more than 100 times the samples "
+        "would be needed: raise the margin or enlarge the tile");
+    assert_says(unknown, "mine is too noisy to tell on 12_point_plane (against truth)");
     assert_says(
         claim_of("NO DIFFERENCE FOUND", "EQUIVALENT", 0, 0, 0, 3),
         "no difference of mine was found on 12_point_plane (against truth); 1.23 % would have been");

@@ -150,8 +150,6 @@ TEST(test_normal_equivalent)
         }
 }
 
-/* By hand: va = 4/10, vb = 9/5 of n = 10 and 5: V = 2.2, nu = 4.84 / (.16/9 + 3.24/4) = 5.84690...
- */
 /* Chi-square tails. Even k in closed form: e^-y sum_{i < k/2} y^i/i!, in logarithms, far beyond what a
  * double p can hold; k = 1 is 2 Q(sqrt x) of the normal law; and GSL near the centre of large k. */
 TEST(test_chi2)
@@ -185,6 +183,7 @@ TEST(test_hill)
     assert_true(stats_hill_z(3, INFINITY) == 3);
 }
 
+/* The first by hand: va = 4/10, vb = 9/5 of n = 10 and 5: V = 2.2, nu = 4.84 / (.16/9 + 3.24/4) = 5.84690... */
 TEST(test_dof)
 {
     assert_close(stats_welch_dof(0.4, 10, 1.8, 5), 4.84 / (0.16 / 9 + 3.24 / 4), 1e-14);
