@@ -19,8 +19,8 @@ fragments() {
 dead_links() {
     local page link file
     for page in "$@"; do
-        awk '/^```/ { code = !code } !code && !/^    /' "$page" | sed 's/`[^`]*`//g' | grep -oE '\]\([^) ]+\)' |
-            sed 's/^](//; s/)$//' | grep -vE '^[a-z]+:' | while read -r link; do
+        awk '/^```/ { code = !code } !code && !/^    /' "$page" | sed 's/`[^`]*`//g' | grep -oE '\]\([^) ]+(\)|$)' |
+            sed 's/^](//; /)$/!s/$/: not closed/; s/)$//' | grep -vE '^[a-z]+:' | while read -r link; do
             file=${link%%#*}
             if [ -z "$file" ]; then file=$page; else file=$(dirname "$page")/$file; fi
             if [ ! -e "$file" ]; then
@@ -36,10 +36,10 @@ mapfile -t pages < <(git ls-files -co --exclude-standard -- '*.md' | while read 
 tell "links of ${#pages[@]} pages" "$(dead_links "${pages[@]}")"
 
 mkdir "$tmp/docs"
-printf '# One page\n[a](../two.md#a-heading-2) [b](gone.md) [c](../two.md#gone) [d](#one-page) `[e](code.md)`\n' >"$tmp/docs/one.md"
+printf '# One page\n[a](../two.md#a-heading-2) [b](gone.md) [c](../two.md#gone) [d](#one-page) `[e](code.md)` [f](two.md\n' >"$tmp/docs/one.md"
 printf '## A heading, 2\n' >"$tmp/two.md"
-tell "control: two dead links are seen" "$(dead_links "$tmp/docs/one.md" | sed "s,^$tmp/,," |
-    diff - <(printf 'docs/one.md: gone.md\ndocs/one.md: ../two.md#gone: no such heading\n'))"
+tell "control: three dead links are seen" "$(dead_links "$tmp/docs/one.md" | sed "s,^$tmp/,," |
+    diff - <(printf 'docs/one.md: gone.md\ndocs/one.md: ../two.md#gone: no such heading\ndocs/one.md: two.md: not closed\n'))"
 
 # Prints sources named in code of pages, by name or by path, that do not exist. A name with NAME in it stands for any.
 git ls-files -co --exclude-standard | sed 's,.*/,,' | sort -u >"$tmp/names"
