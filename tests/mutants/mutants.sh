@@ -160,7 +160,7 @@ while IFS='|' read -r name status cpu scene against why; do
 done < <(printf '%s\n' "${names[@]}" | xargs -P "$(nproc)" -I{} bash -c 'one_and_tell {}')
 [ -n "$build_only" ] || echo "$caught caught, $missed missed"
 
-# The page: each row from the patch's own lines and the result of the run.
+# The page: each row from the patch's own lines and the result of the run; sections below the table stay as they are.
 write_table() {
     local name status cpu scene against why
     cat <<EOF
@@ -187,9 +187,11 @@ EOF
         [ "$name" = none ] && continue
         IFS='|' read -r status cpu scene against why <"$build/mutants/$name.result"
         [ "$status" = caught ] || scene="**not found**"
-        printf '| %s (`%s`) | %s | %s | %s | %s | %.0f |\n' "$(sed -n 's/^Bug: //p' "tests/mutants/$name.patch")" "$name" \
-            "$(sed -n 's/^Where: //p' "tests/mutants/$name.patch")" "$scene" "$against" "${why%%, p = *}" "$cpu"
+        printf '| %s (`%s`) | %s | %s | %s | %s | %.0f |\n' "$(sed -n 's/^Bug: //p' "$patches/$name.patch")" "$name" \
+            "$(sed -n 's/^Where: //p' "$patches/$name.patch")" "$scene" "$against" "${why%%, p = *}" "$cpu"
     done
+    echo
+    sed -n '/^## /,$p' "$table"
 }
 if [ -n "$table" ]; then
     write_table >"$table.new" && mv "$table.new" "$table"
