@@ -265,7 +265,7 @@ TEST(test_refusals)
 }
 
 /* Level: 40 pairs of equal law at alpha 0.01 (H0: equal): more than 4 DIFFERENT has a probability below 1e-4 under it. Power: 20 % more
- * light, whose standard error is 0.3 %, is found every time. The same by permutation and by flips. */
+ * light, whose standard error is 0.3 %, is found in all of five pairs. The same by permutation and by flips. */
 TEST(test_verdicts)
 {
     static float a[K * VALUES], b[K * VALUES], bright[K * VALUES];
@@ -284,10 +284,12 @@ TEST(test_verdicts)
             alarms[way] += assay_result_of(c)->verdict == ASSAY_DIFFERENT;
             assert_int_equal(isnan(assay_result_of(c)->exact_p), way == 0);
             assay_free(c);
+            if (i > 4)
+                continue;
             c = judge(&side[2], &side[1], &o);
             assert_int_equal(assay_result_of(c)->verdict, ASSAY_DIFFERENT);
             assay_free(c);
-            if (way != 0 || i > 4)
+            if (way != 0)
                 continue;
             static float a2[K * VALUES], b2[K * VALUES];
             make_replicates(a2, 1000 + 2 * i, 1);
