@@ -4,6 +4,7 @@
 #include "tools/diagnose/bug_fit.h"
 #include "tools/stats/distributions.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -206,6 +207,7 @@ static struct sums sum_of(const struct cells *s, int x, int y, int side_x, int s
  * need not resemble ours. */
 static bool measure(const struct cells *s, double alpha, struct difference *out, struct err *e)
 {
+    assert(s->cell > 0); /* add_image() has set it */
     int side = s->cell < RUBRIC_TILE ? RUBRIC_TILE / s->cell : 1;
     int columns = s->columns / side, rows = s->rows / side, num = columns * rows;
     double z = stats_normal_quantile(alpha / 2 / (num + NUM_CHANNELS)), worst = -1;
