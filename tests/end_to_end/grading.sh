@@ -54,6 +54,39 @@ rm -r "$tmp/one/ada" "$tmp/one/eve/grade.json"
 check "after an interruption" grade -o "$tmp/one" -j 2
 check "the same again" test "$(sums "$tmp/one")" = "$(sums "$tmp/two")"
 
+# Too few samples to decide: a program is run again, with others, until it is; one that takes no other number of samples is left to
+# staff, one that is far off needs no further run. Without a budget none is run again.
+mv "$tmp/submissions" "$tmp/class"
+student right
+student deaf -s 4
+student dim -m 0
+sed '/^image/,$d; s/^total.*/total 8/' tests/end_to_end/quick.rubric >"$tmp/noisy.rubric"
+cat >>"$tmp/noisy.rubric" <<'END'
+image box
+  scene 41_cornell
+  size 64 64
+  spp 4
+  bounces 3
+  reference ours 512
+part 1 Light
+check box 8 equal box
+  image 0.01 0.05
+  tile 0.04 0.12
+END
+sed 's/^total/budget cpu 0\n&/' "$tmp/noisy.rubric" >"$tmp/poor.rubric"
+for kind in noisy poor; do "$build/assay" grade -q -j 2 -o "$tmp/$kind" "$tmp/$kind.rubric" "$tmp/submissions"/* >"$tmp/out" 2>&1; done
+runs() { # FOLDER: of each student the points, whether they are provisional, the runs of the image
+    python3 -c '
+import json, sys
+for id in "deaf", "dim", "right":
+    grade = json.load(open(f"{sys.argv[1]}/{id}/grade.json"))
+    runs = grade["pictures"][0]["runs"]
+    print(id, grade["points"], grade["checks"][0]["provisional"], runs if runs == 1 else "more")' "$1" 2>&1
+}
+tell "further runs decide where there was too much noise" "$(runs "$tmp/noisy" | diff - <(printf '%s\n' 'deaf 8.0 True more' 'dim 0.0 False 1' 'right 8.0 False more'))"
+tell "and none is asked for without a budget" "$(runs "$tmp/poor" | diff - <(printf '%s\n' 'deaf 8.0 True 1' 'dim 0.0 False 1' 'right 8.0 True 1'))"
+rm -r "$tmp/submissions" && mv "$tmp/class" "$tmp/submissions"
+
 # Another rubric for the same images: they are judged anew, not rendered; --again renders them (control).
 times() { (cd "$1" && grep -h '"wall_s"' */grade.json); }
 sed 's/^check point 4/check point 5/; s/^check cornell 6/check cornell 5/; s/0.06 0.2/0.06 0.3/' "$rubric" >"$tmp/other.rubric"
