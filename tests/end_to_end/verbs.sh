@@ -1,7 +1,7 @@
 #!/bin/bash
 # tests/end_to_end/verbs.sh BUILD: verbs and options that the other end-to-end runs leave out: references of a live
-# engine, the matrix of a validation, further looks, rubrics that accept deviations and count samples, locks. Prints "ok
-# NAME", "not ok NAME: why" or "skip NAME".
+# engine, the matrix of a validation, further looks, rubrics that accept deviations and count samples, locks, Slurm.
+# Prints "ok NAME", "not ok NAME: why" or "skip NAME".
 set -u
 build=$(realpath "${1:?usage: tests/end_to_end/verbs.sh BUILD}")
 pathtracer=$build/pathtracer assay=$build/assay
@@ -11,6 +11,7 @@ failures=0
 
 what=""
 . tests/end_to_end/expect.sh
+scene=$PWD/reference/scenes/13_square_patch.dae
 sum() { sha256sum "$1" | cut -d ' ' -f 1; }
 
 # assay reference: what is up to date is not rendered again, the same seed gives the same bits, and a candidate older
@@ -141,6 +142,52 @@ expect "a grading in it" 3 "another run writes there: process $pid on" "$assay" 
 kill -9 $pid && wait $pid 2>/dev/null
 expect "after a kill it is free" 0 "EQUIVALENT" "$assay" validate -q -o "$tmp/taken" --only 11_furnace
 right "and no lock stays" test ! -e "$tmp/taken/.assay-lock"
+
+# Jobs on a cluster, by stand-ins for Slurm's programs that run an array here, a task after the other. Of the first array task 2 is
+# lost like a plug that is pulled; a real cluster: make slurm.
+mkdir "$tmp/slurm" "$tmp/queue"
+cat >"$tmp/slurm/sbatch" <<END
+#!/bin/bash
+for word; do
+    case \$word in
+    --job-name=*) name=\${word#*=} ;;
+    --array=1-*) tasks=\${word#*=1-} ;;
+    --output=*) output=\${word#*=} ;;
+    esac
+done
+for ((k = 1; k <= tasks; k++)); do echo PENDING >"$tmp/queue/\$name \$k"; done
+[ -z "\${CHANGE:-}" ] || echo >>"\$CHANGE"
+[ -n "\${HOLD:-}" ] || setsid "$tmp/run" "\$name" \$tasks "\$output" "\${@: -1}" </dev/null >/dev/null 2>&1 &
+END
+cat >"$tmp/run" <<END
+#!/bin/bash
+for ((k = 1; k <= \$2; k++)); do
+    echo RUNNING >"$tmp/queue/\$1 \$k"
+    [[ \$1 = *-1 && \$k = "\${LOST:-}" ]] || SLURM_ARRAY_TASK_ID=\$k sh -c "\$4" >"\${3/\%a/\$k}" 2>&1
+    rm -f "$tmp/queue/\$1 \$k"
+done
+END
+printf '#!/bin/sh\ncd "%s" && for task in *; do [ ! -e "$task" ] || echo "$task $(cat "$task")"; done\n' "$tmp/queue" >"$tmp/slurm/squeue"
+printf '#!/bin/sh\nrm -f "%s/$2 "*\n' "$tmp/queue" >"$tmp/slurm/scancel"
+chmod +x "$tmp/slurm"/* "$tmp/run"
+slurm() { (PATH=$tmp/slurm:$PATH exec timeout 60 "$assay" slurm "$@"); }
+said() { "$@" 2>"$tmp/said" || { local status=$?; tail -n 1 "$tmp/said" >&2; return $status; }; } # its last line alone
+render=(pathtracer -q -t 1 -r 32 32 -s 16)
+"$pathtracer" "${render[@]:1}" -f "$tmp/here.exr" -f "$tmp/here.png" "$scene" >"$tmp/out"
+export LOST=2
+expect "slurm: a lost task is run again" 0 "4 of 4 jobs made.*some submitted again" slurm --plan "$tmp/plan" --parts 4 "${render[@]}" -f "$tmp/there.exr" -f "$tmp/there.png" "$scene"
+right "slurm: the image is the one made here" cmp "$tmp/here.png" "$tmp/there.png"
+right "slurm: nothing else is run twice" test "$(cat "$tmp"/plan/log/assay-*.txt | grep -c begins)" = 4
+cp "$scene" "$tmp/other.dae"
+CHANGE=$tmp/other.dae LOST="" expect "slurm: a job that cannot be made is tried three times" 3 "job 0 came back 3 times without its artefact: .*other.dae" \
+    said slurm --plan "$tmp/changed" --parts 1 "${render[@]}" -f "$tmp/z.exr" "$tmp/other.dae"
+HOLD=1 slurm --plan "$tmp/stop" --parts 2 "${render[@]}" -f "$tmp/z.exr" "$scene" >"$tmp/out" 2>"$tmp/err" &
+follower=$!
+for ((i = 0; i < 100; i++)); do grep -q "2 waiting" "$tmp/err" && break || sleep 0.1; done
+pkill -TERM -P $follower timeout
+wait $follower
+right "slurm: one that is stopped cancels its jobs" test "$?:$(ls "$tmp/queue")" = 3:
+right "slurm: and says how to go on" grep -q "interrupted with 0 of 2 jobs made; the same command goes on" "$tmp/err"
 
 # make waits for other installations of packages to end, and for nothing else.
 mkdir "$tmp/stub"
