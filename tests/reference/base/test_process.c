@@ -227,7 +227,8 @@ TEST(a_long_output_is_logged_whole)
     assert_int_equal(st.st_size, 100 * 100000 + 4);
 }
 
-/* `yes` prints for ever, faster than we can read: the clock must win and the log must end. */
+/* `yes` prints for ever, faster than we can read: the time limit must still apply and the log must
+ * stay bounded. */
 TEST(a_flood_is_stopped_by_the_clock_and_the_log_is_bounded)
 {
     const char *log = test_path("flood.log");

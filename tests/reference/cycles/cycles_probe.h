@@ -1,5 +1,5 @@
-/* Scenes built in C, rendered by the driver of Blender and held against closed forms. The tests that use
- * it skip where there is no Blender. */
+/* Scenes built in C, rendered by the Cycles driver and compared with closed forms. Tests that use this skip where
+ * there is no Blender. */
 #ifndef ASSAY_CYCLES_PROBE_H
 #define ASSAY_CYCLES_PROBE_H
 
@@ -30,7 +30,7 @@ void probe_size(struct probe *f, int width, int height);
 /* The sky as environment and light of the scene. */
 void probe_sky(struct probe *f, const struct sky *sky);
 
-/* scene_finish() and camera_init(), or the test fails with their line. */
+/* scene_finish() and camera_init(); the test fails with their error message if they do. */
 void probe_finish(struct probe *f);
 
 /* Radiance that arrives at the eye from direction d, which is not of unit length: at distance 1 along

@@ -49,8 +49,8 @@ static uint32_t build_metal(struct scene *s, const struct metal *a)
     return i;
 }
 
-/* What a white surrounding makes of a ball of metal: the directional albedo of the cosine, from a
- * table. */
+/* A ball in white surroundings shows its directional albedo at the angle it is seen under, here tabulated
+ * over the cosine. */
 enum { TABLE = 96 };
 #define BALL_Z      (-3)
 #define BALL_RADIUS 1.25
@@ -89,7 +89,7 @@ static void ball_radiance(const double d[3], double out[3], const void *data)
         out[k] = q > 0 ? t->at[k][i] + (x - i) * (t->at[k][i + 1] - t->at[k][i]) : 1;
 }
 
-/* Is, and is not what differs in one property. */
+/* The ball in a white sky has the albedo of `is`; negative control: `is_not`, which differs in one property. */
 static void check_ball(struct probe *f, struct metal is, struct metal is_not, double allowed)
 {
     struct moments m;

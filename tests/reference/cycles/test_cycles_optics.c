@@ -119,7 +119,7 @@ struct boundary {
 
 static const double IN_FRONT[3] = {3, 2, 1}, BEHIND[3] = {1, 2, 3};
 
-/* Reflectance of a side on which the cosine is c; n: behind over here. */
+/* Reflectance (Fresnel's or Schlick's) at the cosine c; n: index behind the boundary over that in front. */
 static double reflected(const struct boundary *b, double c, double n)
 {
     double r = optics_fresnel(c, n), r0 = (1 - n) / (1 + n) * (1 - n) / (1 + n);

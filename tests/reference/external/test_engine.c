@@ -81,7 +81,7 @@ static void engine_of_script(const char *script, const char *more, struct engine
     must_load(json, en);
 }
 
-/* An image of each replicate, of the number of its seed. */
+/* Writes an image for each replicate, named after its seed. */
 static void write_replicates(int num)
 {
     for (int k = 0; k < num; k++) {
@@ -441,8 +441,8 @@ TEST(replicates_are_folded)
     json_decref(manifest);
 }
 
-/* x, 2 x, 5 x: mean 8 x/3, M2 = 78 x^2/9 = 26 x^2/3; a tent of radius 1 in which pixels share samples makes that 2.25 times as
- * much (test_camera.c), one from which each pixel draws its own nothing. */
+/* x, 2 x, 5 x: mean 8 x/3, M2 = 78 x^2/9 = 26 x^2/3. With a tent of radius 1 whose samples pixels share, M2 is
+ * multiplied by 2.25 (test_camera.c); if each pixel draws its own samples it stays. */
 TEST(pixels_that_share_samples_count_as_noisier)
 {
     static const char *const more[] = {", 'filter': 'tent:1'",

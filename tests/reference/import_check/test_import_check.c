@@ -132,7 +132,7 @@ TEST(readers_that_agree)
     }
 }
 
-/* Readers that differ, for that reason; the fixture is as it was made again. */
+/* The comparison must find a difference, with that reason; then the fixture is made anew. */
 static void assert_differ(struct fixture *f, const char *why)
 {
     struct import_report r = compare(f);

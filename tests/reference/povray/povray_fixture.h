@@ -22,7 +22,7 @@ struct fixture {
 /* Takes over the scene and completes it. Two replicates of subgrid 1. Aborts the test on failure. */
 void fixture_init(struct fixture *f, struct scene s, int size, int depth);
 void fixture_free(struct fixture *f);
-/* POV-Ray's image; aborts the test if there is none. Of a NULL manifest nothing is told. */
+/* POV-Ray's image, which the caller frees; fails the test if there is none. `manifest` may be NULL. */
 struct moments must_render(struct fixture *f, json_t *manifest);
 /* The scene as POV-Ray gets it; the caller frees. */
 char *povray_text(const struct scene *s, const struct camera *c, int depth,
@@ -36,8 +36,8 @@ double image_mean(const struct moments *m, int channel);
 void render_ours(struct fixture *f, int depth, double mean[3], double variance[3]);
 
 enum { CALLS = 6 };
-/* H0: the image means x of that channel, one from each of independent calls of POV-Ray, are around ours: t-test, alpha = 1e-3
- * two-sided. Prints the difference. */
+/* H0: x[.][channel], the image means of CALLS independent calls of POV-Ray, have our mean as their expectation:
+ * t-test with CALLS - 1 degrees of freedom, alpha = 1e-3 two-sided. `variance`: of our mean. Prints the difference. */
 bool means_agree(double x[CALLS][3], int channel, double ours, double variance);
 
 #endif

@@ -100,7 +100,7 @@ static double sum_of_component(int n, int row, int column, double power)
 /* H0: rotations are uniform. A turned axis is then uniform on the sphere: each component has mean 0
  * and variance 1/3, its square mean 1/3 and variance 1/5 - 1/9 = 4/45. n = 4000, 18 z-tests, each at
  * alpha = 1e-6 (4.89). Power: an axis that stays within 84 degrees of where it was moves a mean
- * square by 0.03, 6 standard errors. Negative control: turns about one axis only, whose squares have
+ * square by 0.038, 8 standard errors. Negative control: turns about one axis only, whose squares have
  * mean 1/2, are rejected. */
 TEST(test_rotations_are_uniform)
 {

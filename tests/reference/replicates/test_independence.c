@@ -1,5 +1,5 @@
-/* Independence of replicates: how often independent ones fail, and that dependent ones are found. The
- * replicates are drawn here; the laws are those of simulate.h. */
+/* The test of replicates' independence: its false alarm rate, and that dependent replicates are found. The
+ * replicates are drawn here, from the distributions of simulate.h. */
 #include "reference/replicates/independence.h"
 #include "tests/support/simulate.h"
 #include "tests/support/test.h"
@@ -8,8 +8,8 @@
 
 enum { SIDE = 32, PIXELS = SIDE * SIDE };
 
-/* K images of one law; where `blur`, each pixel is half its own draw and half its left neighbour's,
- * which correlates pixels but not replicates. */
+/* `count` images of one distribution; with `blur` each pixel is the mean of its own draw and its left
+ * neighbour's, which correlates pixels but not replicates. */
 static struct replicates draw_all(enum law law, int count, bool blur, uint64_t *state)
 {
     struct replicates r;
@@ -38,10 +38,10 @@ static struct independence test(const struct replicates *r, double alpha)
     return out;
 }
 
-/* H0 true, alpha = 1 %, n = 1000 sets a row of 8 or 32 replicates of 1024 pixels. Each row's count of failures
- * has at most the law Binomial(1000, 1 %): more than 29 have the probability 1.8e-7. Under H0 each z
- * is standard normal: beyond 1.96 in 5 %, between 15 and 96 of 1000 but for 1e-9 (neighbours, batches).
- * That a test is not merely silent is what the lower bound and the next tests are for. */
+/* H0 true, alpha = 1 %; each row is n = 1000 sets of 8 or 32 replicates of 1024 pixels. Its number of failures
+ * is stochastically at most Binomial(1000, 1 %): more than 29 have probability 2.1e-7. Under H0 each z of
+ * neighbours and batches is standard normal: |z| > 1.96 in 5 %, so in 15 to 96 of 1000, except with
+ * probability 1e-9 on each side. The lower bound and the next tests show that the test is not just silent. */
 TEST(independent_replicates_pass)
 {
     static const struct {
@@ -117,7 +117,8 @@ TEST(a_copy_is_found)
     replicates_free(&r);
 }
 
-/* Replicate j becomes weight x replicate i + sqrt(1 - weight^2) x itself, of noise of variance 1. */
+/* The noise of replicate j becomes weight x noise of i + sqrt(1 - weight^2) x its own: the variance stays and the
+ * correlation of j and i is `weight`. */
 static void mix(struct replicates *r, int j, int i, double weight)
 {
     float *to = r->luminance + j * PIXELS;
@@ -128,9 +129,9 @@ static void mix(struct replicates *r, int j, int i, double weight)
     }
 }
 
-/* One standard deviation of a correlation is 1/32 here, the limit 5.9 of them, 0.18: a pair of correlation
- * 0.4 (z = 12) is found, at alpha = 1e-6, in 50 of 50 sets; chance of a miss below 1e-9 each. Likewise
- * neighbours of correlation 0.1 (15 pairs: one standard deviation is 0.008, z = 12). */
+/* The standard deviation of a pair's correlation is 1/32 here and the limit 5.9 of them, 0.18, at alpha = 1e-6: a
+ * pair of correlation 0.4 (z = 12) is found in 50 of 50 sets; each is missed with probability below 1e-9.
+ * Likewise neighbours of correlation 0.1 (15 pairs: standard deviation 0.008, z = 12). */
 TEST(correlated_replicates_are_found)
 {
     uint64_t seed = 77;
@@ -246,9 +247,9 @@ static struct replicates splat_all(int count, double sharing, uint64_t *state)
     return r;
 }
 
-/* H0 with a known filter: the sum over a large square varies 2.25 times as much as its pixels do
- * (test_camera.c), and replicates are independent; the limit allows 1.5 times more than that. alpha
- * 1 %, n = 200 sets of 16: more than 10 failures have probability 7e-5. Control: with the filter
+/* H0 with a known filter: the variance of a large square's sum is 2.25 times the sum of its pixels' variances
+ * (test_camera.c), and replicates are independent; the limit is 1.5 times that. alpha
+ * 1 %, n = 200 sets of 16: more than 10 failures have probability 7e-6. Control: with the filter
  * unknown all sets are refused. The measured ratio over squares of 16 must be 2.25 (1 - 1/48)^2 (the
  * border cuts the rest) within 10 %: its standard error, from 16 replicates of 4 squares in 200
  * sets, is 1.4 %. */

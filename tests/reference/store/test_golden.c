@@ -206,7 +206,7 @@ STORE(a_killed_update_leaves_the_old_pair_or_the_new)
     struct err e;
     assert_true(moments_write(next, &f->m, NULL, 0, &e));
     assert_first_value(f, 5.0 / 3 + 2);
-    /* No further update comes: what was interrupted is done, and nothing where nothing was. */
+    /* Without a further update the interrupted one is completed; where none was interrupted, nothing happens. */
     assert_int_equal(rename(f->exr, old), 0);
     f->m.mean[0] += 1;
     write_golden(f);
@@ -242,7 +242,7 @@ STORE(a_broken_manifest_is_an_error_and_is_not_overwritten)
     assert_refused(f, "'width' is missing");
 }
 
-/* Both hashes fit, but the image holds other observations than its manifest says. */
+/* Both hashes match, but the image's observations are not those that its manifest states. */
 STORE(an_image_that_contradicts_its_manifest_is_refused)
 {
     f->m.n[3] = 2;

@@ -95,7 +95,7 @@ TEST(fields_are_those_of_the_file)
     assert_string_not_equal(d->sha256, c->sha256);
 }
 
-/* What a scene shows is in its hash: every image that one loads is among what its .json says that it uses, and vice versa. */
+/* The images that a scene loads are exactly those its .json lists as used, so its hash covers them. */
 TEST(images_of_textures_are_used_files)
 {
     struct suite s;
@@ -165,7 +165,8 @@ static void albedos_are_2_percent_apart(const char *line_a, const char *line_b)
         assert_true(b[c] > 1.0199999 * a[c] && b[c] < 1.0200001 * a[c]);
 }
 
-/* Both lines are `format` of a number each, the second of more than low and less than high times the first. */
+/* Both lines are `format` with one number each; the second number is more than low and less than high times the
+ * first. */
 static void factor(const char *line_a, const char *line_b, const char *format, double low,
                    double high)
 {

@@ -1,8 +1,8 @@
 /* Scenes of the suite that have no closed form as a whole, by other routes: closed forms of their
  * direct light, a mirror unfolded into a second room, lamps one by one. H0 of every z-test: both sides
  * have the same mean. Two-sided at alpha = 1e-6 each (|z| < 4.89), one seed for each image, fixed n,
- * no retry; each has a negative control that the same test must reject. The power is what the control
- * shows: it is off by the amount that its comment says. */
+ * no retry; each has a negative control that the same test must reject. The power is
+ * that the control is rejected; its comment says by how much it is wrong. */
 #include "reference/suite/suite.h"
 #include "tests/support/render_check.h"
 #include "tests/support/suite_files.h"

@@ -71,8 +71,8 @@ static double wall_transfer(double cosine, double phi, const void *ctx)
     return at_p * at_q / (M_PI * d2 * d2);
 }
 
-/* What a wall point reflects of the radiance 1 that fills the room, for each unit of albedo, by
- * quadrature over the wall; applied again for every bounce. */
+/* `gather`: radiance that a wall point of albedo 1 reflects when all walls have radiance 1, by quadrature over the
+ * wall; applied once per bounce. */
 TEST(furnace_matches_quadrature)
 {
     double gather = 4 * over_cap(wall_transfer, NULL, -1);

@@ -228,8 +228,8 @@ TEST(map_is_what_make_sky_writes)
 }
 
 /* What a surface of albedo 1 reflects under the map itself, bilinear between the middles of texels and
- * constant beyond the middles of the outer rows: Gauss-Legendre over a sixteenth of each cell, in the
- * directions in front of the surface. texel[row][col]. The edge of the hemisphere runs through cells, where
+ * constant beyond the middles of the outer rows: Gauss-Legendre with 4 x 4 points over each of 8 x 8 parts of
+ * each cell, in the directions in front of the surface. The edge of the hemisphere runs through cells, where
  * the integrand has a kink; the error that leaves is of order 1e-6. */
 static double reflected_under_map(const struct image *im, int channel, const double n[3])
 {
@@ -266,7 +266,8 @@ static double reflected_under_map(const struct image *im, int channel, const dou
     return sum * (M_PI / MAP_HEIGHT) * (2 * M_PI / MAP_WIDTH) / M_PI;
 }
 
-/* So the form may be used for the map: what the texels' steepness is there for. */
+/* So the closed form may be used for the map: texel values are chosen steeper than the gradient to make up for
+ * bilinear interpolation. Control: the plain values of the gradient at texel centres. */
 TEST(map_stands_for_the_gradient)
 {
     OWN(image) im, plain;
@@ -317,7 +318,7 @@ static double floor_seen_down(double u, double v, int channel)
     return sky_radiance[channel] * albedo[channel] * (1 - truth_wall_share(x + 0.75, local, 1.5));
 }
 
-/* Sine of the angle between the ray and the axis, times distance over radius. */
+/* sin(theta_i) on the ball: sine of the angle between ray and axis, times distance over radius (8). */
 static double metal_seen(double u, double v, int channel)
 {
     static const double sky_radiance[3] = {1, .9, .8};

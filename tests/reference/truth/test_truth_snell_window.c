@@ -7,9 +7,9 @@
 #include "tests/support/own.h"
 #include "tests/support/test.h"
 
-/* What is left of the sky's radiance in glass: the power of a thin bundle of rays is that outside times
- * the transmittance, over a solid angle and a cross-section that refraction has changed. Solid angles by
- * central differences of the angle outside. */
+/* Radiance in glass over that of the sky, by conservation of power: a thin bundle of rays has the power outside times
+ * the transmittance, in a solid angle and a cross-section that refraction has changed. The ratio of the
+ * solid angles by central differences of the angle outside. */
 static double sky_by_power(double theta, double n)
 {
     const double h = 1e-5;
@@ -75,8 +75,8 @@ static double lambda(const struct metal *m, double z)
     return z == 1 ? 0 : 0.5 * (exp(-a * a) / (a * m->root) - erfc(a));
 }
 
-/* As visible_normal() of test_truth_sky.c: integral over normals m instead of directions wi, for each of
- * which wi is above the surface. psi: azimuth from wo's; t: tan(theta_m) over its value where wi is
+/* As visible_normal() of test_truth_sky.c: the integral over normals m instead of directions wi, restricted to
+ * those m that reflect to above the surface. psi: azimuth from wo's; t: tan(theta_m) over its value where wi is
  * at the horizon. D dm = slope exp(-slope^2/alpha^2) / (pi alpha^2 cos_m) dslope dpsi. */
 static double visible_normal(double psi, double t, const void *data)
 {

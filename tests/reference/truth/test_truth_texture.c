@@ -1,4 +1,5 @@
-/* The closed form of 29_textures by another route: the endless texture at many places of a pixel, as the definition has it. */
+/* The closed form of 29_textures by another route: the mean over many points of a pixel of the texture as it is
+ * defined, repeated without end. */
 #include "reference/truth/truth.h"
 #include "tests/support/quadrature.h"
 #include "tests/support/suite_files.h"

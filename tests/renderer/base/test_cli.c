@@ -11,7 +11,8 @@ static const struct cli_option options[] = {{'j', "jobs", "N", .help = "jobs"},
                                             {0, "seed", "N", .help = "seed"},
                                             {0}};
 
-/* "LONG=VALUE,VALUE " of each option, "VALUE " of what is none; or the line of the error. */
+/* out: "LONG=VALUE,VALUE " for each option and "VALUE " for each positional word; or the error's
+ * message. */
 static void read_all(char *text, char out[512])
 {
     char *argv[16] = {"program"};

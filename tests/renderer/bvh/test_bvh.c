@@ -203,7 +203,7 @@ TEST(no_self_intersection)
     bvh_free(bvh);
 }
 
-/* One to twenty rays, of a list and of a tree: lanes behind the last of the list are none. */
+/* One to twenty rays against a tree and a list of primitives: nothing is read or written past the n-th lane. */
 TEST(few_rays)
 {
     struct err e = {0};
@@ -225,7 +225,7 @@ TEST(few_rays)
             for (int k = 0; k < 2; k++) {
                 memset(&h[k], 0, sizeof h[k]);
                 memset(occluded[k], 0, sizeof occluded[k]);
-                uint16_t *exact = malloc((size_t)n * sizeof *exact); /* no room behind it */
+                uint16_t *exact = malloc((size_t)n * sizeof *exact); /* reads past its end are seen */
                 assert_non_null(exact);
                 memcpy(exact, lane, (size_t)n * sizeof *exact);
                 bvh_closest(k == 0 ? all : wide, &r, exact, n, &h[k], &stats);
@@ -242,8 +242,9 @@ TEST(few_rays)
     }
 }
 
-/* The walls of a cube of any size, seen from its centre: direction d meets them at half an edge over the largest |d|. Beyond 1e4 and below
- * 1e-4 a list has no quick form, and its exact one has to answer. */
+/* The walls of a cube of half edge a, seen from its centre: a ray of direction d meets them at t = a / max(|dx|,
+ * |dy|, |dz|). With coordinates beyond 1e4 or all below 1e-4 a list has no quick test, and its exact one has to
+ * answer. */
 TEST(a_cube_of_any_size)
 {
     static const float half[] = {1e-5f, 5e-4f, 1, 5e3f, 2e4f, 1e6f};
@@ -285,8 +286,8 @@ TEST(a_cube_of_any_size)
     }
 }
 
-/* A cube of six squares, a triangle and two spheres apart from it. A cube has 8 corners, 12 edges and 6 faces; each square
- * is two triangles of one face, with a diagonal between. */
+/* A cube, and apart from it a triangle and two spheres. The cube has 8 corners, 12 edges and 6 faces; each face is
+ * two triangles, which share a diagonal: 6 more edges. */
 TEST(corners_edges_and_faces)
 {
     struct err e = {0};
@@ -319,7 +320,7 @@ TEST(corners_edges_and_faces)
         assert_int_equal(face->is_triangle, alone);
         seen[face->prim[0]]++;
         seen[face->prim[1]] += !alone;
-        /* Both of one square; in its plane; u and v from 0 to 1. */
+        /* Both triangles are of one square and in the face's plane; u and v run from 0 to 1. */
         assert_true(alone || face->prim[0] / 2 == face->prim[1] / 2);
         double lo[2] = {9, 9}, hi[2] = {-9, -9};
         for (int j = 0; j < (alone ? 1 : 2); j++)

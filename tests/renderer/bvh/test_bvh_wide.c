@@ -1,7 +1,7 @@
-/* The wide hierarchy against the scalar one and against brute force: the same distance bit for bit,
- * the same primitive or another at the same distance with a larger number, whatever the rays, the
- * scale and the instructions; and for a ray alone, in a batch or in a packet the same bits of
- * everything. */
+/* The wide hierarchy against the scalar one and against brute force: the same distance bit for bit, and
+ * of primitives at the same distance the one with the smallest number (the scalar tree may return a
+ * larger one), whatever the rays, the scale and the instruction set; and every bit of the answer is the
+ * same for a ray alone, in a batch or in a packet. */
 #include "renderer/bvh/bvh_internal.h"
 #include "renderer/bvh/bvh_wide.h"
 #include "renderer/math/sampler.h"
@@ -68,7 +68,7 @@ static ray make_ray(const struct scene *s, const struct mesh_bounds *f, enum aim
     return (ray){o, dot(d, d) > 0 && dot(d, d) < INFINITY ? normalize(d) : v3(0, 0, 1), 0, tmax};
 }
 
-/* BVH_WIDE by all that this machine has; n of them. */
+/* BVH_WIDE for each instruction set that this machine has. Returns how many. */
 static int build_all(const struct scene *s, struct bvh *wide[3])
 {
     int n = 0;
@@ -112,7 +112,7 @@ static void assert_same(const struct found *a, const struct found *b, int i)
     assert_memory_equal(&a->h.v[i], &b->h.v[i], sizeof a->h.v[i]);
 }
 
-/* `batches` of rays; brute force too for one in `brute`, 0: none. */
+/* Traces `batches` batches of rays; one in `brute` of them by brute force too (0: none). Frees the scene. */
 static void compare(const char *name, struct scene s, uint32_t batches, uint32_t brute)
 {
     struct err e = {0};
@@ -132,7 +132,7 @@ static void compare(const char *name, struct scene s, uint32_t batches, uint32_t
             lane[i] = (uint16_t)i;
         }
         trace(sah, &r, lane, BATCH_LANES, &want);
-        for (int j = 0; j < n; j++) /* which large trees are for: the same */
+        for (int j = 0; j < n; j++) /* turned on by itself for large trees only; the answer is the same */
             wide[j]->wide->in_turns = k % 2;
         bool try_all = brute != 0 && k % brute == 0;
         if (try_all)
@@ -151,7 +151,7 @@ static void compare(const char *name, struct scene s, uint32_t batches, uint32_t
             hits += got[0].h.prim[i] != NO_HIT;
             ties += got[0].h.prim[i] != want.h.prim[i];
         }
-        /* The last ISA again, each ray alone; and every third, so that packets are others. */
+        /* The last ISA again, each ray alone; then every third ray, so that other rays share a packet. */
         for (uint16_t i = 0; i < BATCH_LANES; i++) {
             trace(wide[n - 1], &r, &i, 1, &alone);
             assert_same(&alone, &got[0], i);
@@ -163,7 +163,7 @@ static void compare(const char *name, struct scene s, uint32_t batches, uint32_t
             trace(wide[j], &r, lane, BATCH_LANES / 3, &alone);
             for (int i = 0; i < BATCH_LANES / 3; i++)
                 assert_same(&alone, &got[0], 3 * i);
-            for (int i = 0; i < BATCH_LANES; i++) /* nothing of a lane that is not listed */
+            for (int i = 0; i < BATCH_LANES; i++) /* nothing is written for a lane that is not listed */
                 if (i % 3 != 0 || i / 3 >= BATCH_LANES / 3)
                     assert_true(memcmp(&alone.h.t[i], &none, sizeof none) == 0 &&
                                 alone.h.prim[i] == 0 && !alone.occluded[i]);
@@ -179,8 +179,8 @@ static void compare(const char *name, struct scene s, uint32_t batches, uint32_t
     scene_free(&s);
 }
 
-/* 196 batches are 5 10^4 rays, of seven kinds. Brute force is tried on all of these: its strides have no
- * divisor in common with 7. */
+/* 196 batches are 5 10^4 rays, of seven kinds. Brute force meets every kind: its strides have no divisor in
+ * common with 7. */
 TEST(generated_meshes)
 {
     compare("terrain", mesh_terrain(70, 1), 196, 30);
@@ -201,7 +201,7 @@ TEST(huge_and_tiny)
     compare("1e12", mesh_terrain(30, 1e12f), 70, 11);
 }
 
-/* Triangles that are points and lines among others are never hit and do no harm. */
+/* Triangles that have degenerated to points or lines are never hit and do not disturb the others. */
 TEST(degenerate_triangles)
 {
     struct scene s = mesh_terrain(30, 1);
@@ -214,7 +214,7 @@ TEST(degenerate_triangles)
     compare("degenerate", s, 70, 11);
 }
 
-/* Boxes of the suite's kind, with spheres: lists, and trees in which both kinds meet. */
+/* Spheres and triangles together, few (kept as a list) and many (a tree with both kinds in its leaves). */
 TEST(spheres_and_triangles)
 {
     static const uint32_t counts[] = {1, 2, 9, 31, 33, 60, 500};
@@ -235,7 +235,7 @@ TEST(spheres_and_triangles)
     }
 }
 
-/* Some of a room: two walls of one number each, a floor, a pane and a large ball. */
+/* Half of a room's large primitives: two walls and a pane; or the floor and a large ball. */
 static void add_large(struct scene *s, uint32_t m, bool second_half)
 {
     if (second_half) {
@@ -248,8 +248,8 @@ static void add_large(struct scene *s, uint32_t m, bool second_half)
     build_triangle(s, v3(-0.7f, 0.6f, 0.3f), v3(0.4f, 0.5f, -0.2f), v3(0.1f, -0.4f, 0.6f), m);
 }
 
-/* Large primitives, which are a list, among small ones: triangles anywhere, and tiles that lie in the floor
- * and at the very same distance as it. */
+/* Large primitives, kept as a list beside the tree, among small ones: spheres and triangles anywhere, and tiles in
+ * the plane of the floor, hit at exactly the same distance. */
 TEST(walls_beside_a_tree)
 {
     for (int half = 0; half < 2; half++) {
@@ -314,7 +314,7 @@ TEST(ignored_sphere)
     }
 }
 
-/* At 10^5 triangles no more than 60 bytes each. */
+/* A tree of 10^5 triangles takes at most 60 bytes per triangle. */
 TEST(small_enough)
 {
     OWN(scene) s = mesh_ball(224, 224, 0.5f);

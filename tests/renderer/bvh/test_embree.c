@@ -1,12 +1,12 @@
-/* Rays against triangles: our hierarchies (the two best have to agree bit for bit) against Embree's
- * [Embree], an independent implementation of the same question, on the course's meshes, on generated
- * ones and on adversarial rays; and rays that try to leave a closed mesh.
+/* Rays against triangles: our hierarchies (SAH and wide have to agree bit for bit) against Embree's
+ * [Embree], an independent implementation, on the course's meshes and on generated ones, with ordinary
+ * and adversarial rays; and rays that try to leave a closed mesh.
  *
  * Two answers agree if both miss, or both hit at the same distance, whatever the triangle:
- * |t - t'| <= eps (32 (M + t) + l^2/w) / cos, M being the largest coordinate there is, eps the step
- * of float32 at 1, cos that of the angle between ray and normal (the plane of a grazed triangle
- * cannot be met more precisely than that), l and w the length and the width of the triangle (the
- * plane of a needle is not known better than that).
+ * |t - t'| <= eps (32 (M + t) + l^2/w) / cos, M being the largest coordinate of mesh and ray origins, eps the
+ * spacing of float32 at 1, cos the cosine between ray and normal (at grazing incidence t is no more
+ * precise than that), l and w the longest edge and the height over it (the plane of a needle is not
+ * known better than that). Of two triangles the smaller cos and the larger l^2/w count.
  *
  * Where they do not agree, the triangle that one claims and the other does not is looked at in
  * double. If the ray passes its rim within 32 eps M, float cannot tell; these are counted and
@@ -254,9 +254,10 @@ static struct tally count_rays(const struct both *b, enum aim aim, uint32_t rays
 enum { RAYS = 10000 };
 
 /* Rays that go anywhere meet a rim by chance: of triangles not thinner than 1/300 of the mesh, whose
- * rims are blurred by 32 eps M = 10^-5 of it, less than one in 100. Rays aimed at rims, along edges
- * or along planes are doubtful as often as the two roundings differ, which is bounded only so that
- * the comparison is known to bite. */
+ * rims are blurred by 32 eps M = 10^-5 of it, less than one ray in 100, of which only those count on
+ * which the two answers differ: at most one in 1000 (needles: one in 100). Rays aimed at rims, along
+ * edges or along planes are doubtful as often as the two roundings differ; their bound only shows that
+ * the comparison still tests something. */
 static const double ordinary[NUM_AIMS] = {0.001, 0.1, 0.1, 0.1, 0.1};
 static const double needles[NUM_AIMS] = {0.01, 0.6, 0.6, 0.6, 0.6};
 

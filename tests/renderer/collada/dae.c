@@ -32,7 +32,7 @@ static const char INSTANCE[] =
     "<instance_geometry url='#%s'><bind_material><technique_common><instance_material symbol='m' target='#%s'/>"
     "</technique_common></bind_material></instance_geometry>";
 
-/* The piece in what stands around it, with every $ written out. */
+/* Writes `around` with `piece` in the place of its "%s", each $ABBREVIATION of the piece expanded. */
 static void put(FILE *f, const char *around, const char *piece)
 {
     const char *hole = strstr(around, "%s");

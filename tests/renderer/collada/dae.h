@@ -19,9 +19,9 @@ struct dae {
 
 /* The document; the caller frees. Aborts without memory. */
 char *dae_text(const struct dae *d);
-/* collada_parse() of it, by the name test.dae. */
+/* collada_parse() of dae_text(), as if it were the file test.dae. */
 bool dae_load(const struct dae *d, enum dialect dialect, struct scene *s, struct err *e);
-/* Must fail with the keyword in its line. */
+/* dae_load() must fail, and its message hold the keyword and begin with "test.dae:". */
 void dae_must_fail(struct dae d, enum dialect dialect, const char *keyword);
 
 #endif

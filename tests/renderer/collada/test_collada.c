@@ -179,7 +179,7 @@ static char *dump(const struct scene *s)
     return text;
 }
 
-/* The same words, and numbers; a tolerance below 0 is that of float32. */
+/* Whether words are equal and numbers agree within the tolerance; below 0: when both are rounded to float32. */
 static bool same(const char *got, const char *want, double tolerance)
 {
     for (;;) {
@@ -286,7 +286,7 @@ static void add_line(struct test_case *c, char *line)
     c->expected[c->num_expected++] = line;
 }
 
-/* What it does not say itself it expects as the one before. */
+/* A "+" case that states no expectation inherits that of the case before. */
 static const struct test_case *complete(struct test_case *c, const struct test_case *before)
 {
     if (*c->line == '+' && c->fails == NULL && c->num_expected == 0) {
@@ -405,7 +405,7 @@ TEST(deep_nesting_is_an_error)
     dae_must_fail((struct dae){.nodes = nodes}, DIALECT_AUTO, "nested deeper");
 }
 
-/* The parser counts lines up to 65535 only; the document's own 5th line is where `nodes` starts. */
+/* The parser itself counts lines only up to 65535. */
 TEST(lines_are_right_far_down)
 {
     enum { LINES = 100000 };

@@ -1,7 +1,6 @@
-/* Scenes that must fail. tests/bad/expected has the name of each, the dialect it is read as if not its own, and what the
- * line of the error must hold. Each file is 00_valid.dae with the one fault of its name, on the
- * line that carries the comment <!-- fault -->; the expected line number is found by that comment,
- * not by the loader. */
+/* Scenes that must be refused. A line of tests/bad/expected has a scene's name, ":DIALECT" if it is not read in its
+ * own, and a part of the error message. Each file is 00_valid.dae with one fault, the one of its name, on the line
+ * with the comment <!-- fault -->, by which the test finds the expected line number. */
 #define _GNU_SOURCE
 #include "renderer/collada/collada.h"
 #include "tests/support/own.h"

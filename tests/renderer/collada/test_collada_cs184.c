@@ -90,9 +90,9 @@ TEST(empty_box)
     assert_close(s.lights[0].position, 0, 1.49f, 0.00431585f);
 }
 
-/* No CGL file, but of the Blender that wrote all of them; its phong has a highlight of exponent 256, so of alpha^2 = 2/(4 256 + 2)
- * where it is taken at its word. Direction of the light: M (0,0,-1,1) = (1 - .5, 1 - .5, 1.5 - .7071068), to Y up (-.5, .7928932,
- * .5), over its length 1.0624. */
+/* No CGL extras, but written by the Blender that wrote all CGL files. Read as COLLADA, its phong has a highlight of
+ * exponent 256, so alpha^2 = 2/(4 256 + 2). Direction of the light: M (0,0,-1,1) = (1 - .5, 1 - .5, 1.5 - .7071068),
+ * by Z_UP (x, y, z) -> (-x, z, y) (-.5, .7928932, .5), divided by its length 1.0624. */
 TEST(meshes_of_assignment_two)
 {
     struct scene s = must_load("meshedit/cow.dae", DIALECT_COLLADA);

@@ -1,6 +1,5 @@
-/* A valid scene, damaged in 12000 ways that are the same in every run. Whatever comes out, the loader
- * must either load it or say one line; crashes, leaks and undefined behaviour are for the sanitizers
- * to see. */
+/* A valid scene, damaged in 12000 ways that are the same in every run. The loader must either load the
+ * result or refuse it with one line; crashes, leaks and undefined behaviour are found by the sanitizers. */
 #include "renderer/collada/collada.h"
 #include "tests/support/own.h"
 #include "tests/support/test.h"
@@ -50,8 +49,8 @@ static size_t remove_run(char *text, size_t size, uint32_t *state)
     return size - n;
 }
 
-/* A whole line goes, comes twice or swaps with its successor, which leaves most documents well-formed
- * where elements have a line of their own. */
+/* A whole line is removed or doubled, which leaves many documents well-formed, because elements have lines
+ * of their own. */
 static size_t spoil_lines(char *text, size_t size, uint32_t *state)
 {
     size_t start = draw(state, (uint32_t)size);

@@ -5,8 +5,8 @@
 #include "tests/support/own.h"
 #include "tests/support/test.h"
 
-/* A quadrangle with corners (0,0), (1,0), (1,1), (0,1) and two sets of coordinates: of number 4 u = 1 - x, v = y, by vertex; of
- * number 7 u = 2 x, v = 3 y, with a third param. */
+/* A quadrangle with corners (0,0), (1,0), (1,1), (0,1) and two sets of texture coordinates: set 4, of the vertices, u
+ * = 1 - x, v = y; set 7, of the corners, u = 2 x, v = 3 y, with a third param. */
 static const char DOCUMENT[] =
     "<COLLADA xmlns='http://www.collada.org/2005/11/COLLADASchema' version='1.4.1'><asset/>\n"
     "<library_images>%s</library_images>\n"
@@ -134,7 +134,7 @@ TEST(images_are_read_once)
     assert_true(s.lights[0].textured);
 }
 
-/* Absolute names, file:// and COLLADA 1.5's <ref>; an escape that is none is a name. */
+/* Absolute names, file:// and COLLADA 1.5's <ref>; a % that begins no escape stands for itself. */
 TEST(other_names)
 {
     static const char *const forms[] = {"%s/sub/a b.png", "file://%s/sub/a%%20b.png",

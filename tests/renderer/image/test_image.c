@@ -284,7 +284,7 @@ TEST(png_as_others_write_it)
             }
 }
 
-/* How cameras write it, in the byte orders of either [TIFF 6.0, 2]. */
+/* The Exif chunk in which cameras store the orientation, in both byte orders [TIFF 6.0, 2]. */
 TEST(png_that_is_turned)
 {
     uint8_t exif[2][26] = {"II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0\x06\0\0\0\0\0\0",

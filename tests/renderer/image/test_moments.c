@@ -6,7 +6,7 @@
 
 enum { N = 1000 };
 
-/* A skewed law with a large offset: what naive sums of squares lose digits on. */
+/* A skewed distribution with a large offset, on which naive sums of squares lose digits. */
 static double observation(uint32_t i, int c)
 {
     return 1e4 * c - log(1 - sampler_get(5, i, (uint32_t)c, 0, 0).u[0]);
@@ -101,7 +101,7 @@ TEST(write_and_read)
             assert_true((float)m.m3[c] == back.m3[c]);
         }
     }
-    /* Packed it is the same, and unpacked. */
+    /* Read packed, and then unpacked, the values are the same. */
     OWN(moments) packed;
     MUST(moments_read_packed(path, &packed, &e));
     assert_true(packed.n == NULL);

@@ -2,10 +2,11 @@
  *
  * The samples are whole numbers, so that n, S1 = sum x, S2 = sum x^2, S3 = sum x^3 are known exactly, and
  *   mean = S1/n,  M2 = (n S2 - S1^2)/n,  M3 = (n^2 S3 - 3 n S1 S2 + 2 S1^3)/n^2
- * in 128-bit integers but for one division. Bounds: each of the K merges rounds each moment a few times by at most
- * u = 2^-53 of a sum that only grows, for samples >= 0 far from cancelling, so that the relative error is below
- * 8 K u in the worst case; and if roundings were of random sign, about 8 sqrt(K) u. Drift would be an error that grows as K:
- * the test asks for 100 sqrt(K) u, a tenth of the worst case already at K = 15000, a thousandth of it at the end. */
+ * with whole sums in 128-bit integers and the divisions in long double. Bounds: each of the K merges rounds each moment
+ * a few times, each time by at most u = 2^-53 of a sum that only grows (samples >= 0, no cancellation), so the relative
+ * error is below 8 K u in the worst case, and about 8 sqrt(K) u if roundings have random signs. Drift would be an error
+ * that grows as K: the test asks for 100 sqrt(K) u, which is a tenth of the worst case at K = 15000 and an eightieth of
+ * it at the end (K = 10^6). */
 #include "renderer/image/moments.h"
 #include "tests/support/own.h"
 #include "tests/support/test.h"
@@ -46,10 +47,10 @@ static double worst_error(const struct moments *m, const struct sums *s, double 
 {
     long double n = (long double)s->n;
     long double mean = (long double)s->s1 / n;
-    /* n S2 - S1^2: at most 10^10 * 10^10 * 4 10^4, far below 2^127. */
+    /* n S2 - S1^2: at most 10^10 * 10^10 * 1.6 10^5, far below 2^127. */
     long double m2 = (long double)(s->n * s->s2 - s->s1 * s->s1) / n;
-    /* The third one divided by n^2 first: x = X/n with X whole; n^2 S3 would not fit, so in two halves about the
-     * mean q = S1/n rounded to a whole number r: sums of (x-r)^k are whole and small. */
+    /* M3 about a whole number r near the mean, so that no product comes near 2^127: with the exact sums
+     * t_k = sum (x - r)^k and d = t1/n it is t3 - 3 d t2 + 2 n d^3. */
     wide r = s->s1 / s->n;
     wide t1 = s->s1 - s->n * r;
     wide t2 = s->s2 - 2 * r * s->s1 + s->n * r * r;

@@ -1,4 +1,5 @@
-/* Against the C library in double precision. */
+/* Largest relative error of f against `truth` in double precision, at 10^6 + 1 points from `from`
+ * to `to`. */
 #include "renderer/math/exp.h"
 #include "tests/support/test.h"
 

@@ -51,7 +51,8 @@ enum { BINS_A = 10, BINS_B = 20, BINS = BINS_A * BINS_B, SAMPLES = 1000000 };
 
 /* H0: the warp has its density. alpha = 1e-6 for each of the tests of this file, n = 1e6, fixed
  * seed, no retry. All bins are made equally likely, so each expects 5000 and chi-square is exact
- * enough; a density 1 % wrong in half the bins gives chi-square about 100 above 199 +- 20. */
+ * enough; a density 1 % too high in half the bins and 1 % too low in the others adds 100 to
+ * chi-square, which is 199 +- 20 under H0. */
 static double chi2_p(const double *count)
 {
     double chi2 = 0, expected = (double)SAMPLES / BINS;
@@ -74,8 +75,8 @@ static double turn(double x, double y)
 
 enum warp { COSINE, UNIFORM, SPHERE, CONE, DISK, TRIANGLE, NUM_WARPS };
 
-/* The two numbers, uniform on the unit square if the density is what warp.h says: the cumulative
- * distribution of the height (in closed form) and the azimuth. */
+/* *a, *b: uniform on the unit square if the density is what warp.h says: the cumulative
+ * distribution function of the height (in closed form), and the azimuth in turns. */
 static void unwarp(enum warp w, const float u[4], double *a, double *b)
 {
     const float omc = 0.03f;

@@ -19,7 +19,8 @@ static unsigned times_w(unsigned x)
     return b << 1 | (a ^ b);
 }
 
-/* row (of 32) times the digits of index, for the matrices I, P, U of sampler.h, by their entries. */
+/* C(n, k) mod 2, of which the entries of the matrices of sampler.h are made; by_entries_2() and by_entries_4()
+ * multiply them with the digits entry by entry. */
 static unsigned binomial_is_odd(unsigned n, unsigned k)
 {
     /* Pascal's rule, row after row. */
@@ -90,7 +91,7 @@ static struct sample4 draw(enum sampler_kind kind, uint32_t sample, uint32_t blo
     return sampler_draw(&s, 31 * block, sample, block % 5, block % 3);
 }
 
-/* Whether the n points hold exactly one in each box; bits[d] is how often dimension d is halved. */
+/* Whether each of n boxes holds exactly one of the n points; dimension d is cut into 2^bits[d] intervals. */
 static bool one_in_each(enum sampler_kind kind, uint32_t block, uint32_t first, uint32_t n,
                         const int bits[4])
 {
@@ -141,8 +142,8 @@ TEST(points_are_nets)
 
 enum { BINS = 16, SEEDS = 200000 };
 
-/* H0: (x, y) is uniform on the square. 256 bins, each expecting 781: a density 3 % off in half of
- * them gives chi-square about 180 above 255 +- 23. */
+/* H0: (x, y) is uniform on the square. 256 bins, each expecting 781: a density 3 % too high in half of
+ * them and 3 % too low in the others adds 180 to chi-square, which is 255 +- 23 under H0. */
 struct square {
     double count[BINS][BINS];
 };
@@ -238,7 +239,7 @@ static double variance_of_mean(enum sampler_kind kind, enum integrand f, int d, 
 /* In one dimension nested uniform scrambling puts each of n = 2^m points uniformly and independently
  * into an interval of its own [Owen95], so the mean of u has variance 1/(12 n^3). H0: it has. The
  * sum of 8 or more such numbers is normal enough for var s^2 = 2 sigma^4/(seeds - 1): with 4000 seeds
- * 2.2 %, so the test takes 10.9 % off either way, and finds 20 % with certainty. */
+ * 2.2 %, so the test accepts up to 10.9 % either way, and finds 20 % with power above 0.999. */
 TEST(variance_on_a_line_is_owens)
 {
     enum { R = 4000 };

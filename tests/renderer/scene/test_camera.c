@@ -124,7 +124,7 @@ TEST(the_assignment_frames_the_scene)
     s.camera.hfov = (float)(90 * degree);
     assert_true(camera_init(&c, &s, 800, 600, &e));
     assert_true(fabs((double)c.tan_h - 1) < 1e-6 && fabs((double)c.tan_v - 0.75) < 1e-6);
-    /* From straight above, north is up; from below, too. */
+    /* From straight above the image's up is -Z, from straight below it is +Z; right is +X in both. */
     s.camera.backward = (vec3){0, 2, 0};
     assert_true(camera_init(&c, &s, 800, 600, &e));
     assert_true(near(c.eye, 1, 15.5, 3) && near(c.up, 0, 0, -1) && near(c.right, 1, 0, 0));
@@ -179,9 +179,10 @@ TEST(orthographic_rays_are_parallel)
     }
 }
 
-/* Their distribution functions. Tent of radius r: 1/2 + x/r - x^2/(2 r^2) for x above 0. Gauss less its value g = exp(-r^2/2 s^2)
- * at the radius: with c = s sqrt(pi/2), 1/2 + (c erf(x/(s sqrt 2)) - g x) / (2 (c erf(r/(s sqrt 2)) - g r)). All are odd
- * about 1/2. The density is their derivative, here by differences. */
+/* Cumulative distribution function of a filter along one axis. Tent of radius r: 1/2 + x/r - x^2/(2 r^2) for x > 0.
+ * Gauss minus its value g = exp(-r^2/(2 s^2)) at the radius: with c = s sqrt(pi/2), 1/2 + (c erf(x/(s sqrt 2)) - g x)
+ * / (2 (c erf(r/(s sqrt 2)) - g r)). All minus 1/2 are odd in x. The filter is the derivative, which the test takes
+ * by differences. */
 static double share_below(const struct pixel_filter *f, double x)
 {
     double y = fabs(x), r = f->radius, g = exp(-0.5 * r * r / (f->sigma * f->sigma)),
@@ -221,8 +222,9 @@ TEST(filters_are_drawn_by_their_law)
     }
 }
 
-/* Of a tent of radius 1 the filters of all pixels add up to 1, and the integrals of its square and cube are 2/3 and 1/2: 1.5 and 2 on
- * each axis. Of a box of two pixels' width they add up to 1, too, and f is 1/2: 2 and 4. */
+/* pixel_filter_sharing(f, k) is 1 over the integral of f^k, squared for the two axes. Tent of radius 1: the integrals
+ * of f^2 and f^3 are 2/3 and 1/2, so 1.5^2 and 2^2. Box two pixels wide, f = 1/2: integrals 1/2 and 1/4, so 2^2 and
+ * 4^2. Both sum to 1 over the pixels. */
 TEST(what_pixels_share_is_known)
 {
     struct pixel_filter f = {0};

@@ -1,4 +1,4 @@
-/* The defects of the assignment's starter code that --starter does on purpose, against what they should come to. */
+/* The defects of the assignment's starter code that --starter reproduces, against their expected effect. */
 #include "renderer/shading/light_simd.h"
 #include "renderer/scene/cs184_deviations.h"
 #include "tests/support/build_scene.h"
@@ -62,7 +62,7 @@ static void expect(double got, double want)
         fail_msg("%.6g instead of %.6g", got, want);
 }
 
-/* Without a defect this is the rectangle; each of three heights, so that 1/r is told from 1/r^2. */
+/* Without the defect the irradiance is the rectangle's. At three heights, so that 1/r is distinguished from 1/r^2. */
 TEST(a_density_without_a_distance)
 {
     const vec3 p = v3(0.3f, 0, -0.2f);
@@ -74,7 +74,7 @@ TEST(a_density_without_a_distance)
         }
 }
 
-/* Seen is the turned rectangle, sampled the one of the file, with its own density. */
+/* Rays see the turned rectangle; light sampling uses that of the file, with its own pdf. */
 TEST(a_lamp_that_is_turned)
 {
     const vec3 p = v3(1.2f, 0, 0.1f);

@@ -1,5 +1,5 @@
-/* Environments by themselves: where a map's texels are in the sky, whether directions are chosen
- * with the density that is told, which files are taken. */
+/* Environments by themselves: where a map's texels are in the sky, whether sampled directions have the pdf
+ * that is returned, which files are accepted. */
 #include "renderer/math/discrete.h"
 #include "renderer/scene/environment_simd.h"
 #include "renderer/math/sampler.h"
@@ -80,10 +80,10 @@ static vec3 random_direction(uint32_t i)
     return warp_uniform_sphere(u.u[0], u.u[1]);
 }
 
-/* A sample is told the radiance of its direction, which is that of the tents; and the density of
- * its direction, but for those that float32 puts into the next cell, of which 1 in 1000 is
- * allowed. No more than 1 in 15 is behind the surface: within 17 degrees of a rounded normal and the 12 of a region's
- * half less than 6 % of a cosine's weight is. */
+/* A sample carries the radiance of its direction (bilinear in the map) and the pdf of its direction; at most 1 in
+ * 1000 may differ in the pdf, where float32 rounds the direction into the next cell. At most 1 in 15 is behind the
+ * surface: normals are rounded by up to 17 degrees and regions have half widths of 12, within which less than 6 % of
+ * a cosine's weight lies. */
 TEST(samples_are_what_they_say)
 {
     enum { N = 20000 };
@@ -131,7 +131,7 @@ static void expect_bins(const struct environment *env, vec3 n, double p[BINS])
     }
 }
 
-/* p-value of Pearson's chi-square; bins expected below 10 go together. */
+/* p-value of Pearson's chi-square; bins that expect fewer than 10 are pooled. */
 static double chi_square(const double *p, const uint32_t *count, uint32_t n)
 {
     double sum = 0, rest = 0, rest_count = 0;
@@ -155,9 +155,9 @@ static double chi_square(const double *p, const uint32_t *count, uint32_t n)
     return gsl_cdf_chisq_Q(sum, bins - 1);
 }
 
-/* H0: directions have the density that is told, for three normals. Pearson's chi-square, up to 288 bins, n = 50000,
- * alpha = 1e-5 each, fixed numbers. Power: a map turned by one texel of 32, another normal, and a density that
- * forgets the sine of theta, are rejected. */
+/* H0: directions have the pdf that is returned, for four environments and three normals. Pearson's chi-square, up to
+ * 288 bins, n = 50000, alpha = 1e-5 for each of the 12 tests, fixed numbers. Power: a map turned by one texel of 32,
+ * another normal, and a pdf that forgets the sine of theta, are rejected. */
 TEST(directions_have_their_density)
 {
     enum { N = 50000 };
@@ -188,7 +188,7 @@ TEST(directions_have_their_density)
         expect_bins(env[k], n, p);
         for (int i = 0; i < BINS; i++)
             total += p[i];
-        /* The density integrates to 1; what the points of a bin miss at edges of cells is small. */
+        /* The pdf integrates to 1, up to the quadrature's small error at edges of cells. */
         if (fabs(total - 1) > 2e-3)
             fail_msg("environment %d: density integrates to %.6f", k, total);
         double p_value = chi_square(p, count, N);
@@ -237,8 +237,8 @@ TEST(no_direction_is_left_out)
     assert_true(left_out > 10000);
 }
 
-/* The sum over directions, which power is made of: 4 pi and 2 pi of luminance 1; of a map, within
- * 1 % the tents summed over 128 x 128 pieces of the sphere. */
+/* The integral of luminance over all directions: 4 pi and 2 pi for luminance 1; for a map, within 1 % that of
+ * the bilinear map summed over 128 x 128 pieces of the sphere. */
 TEST(totals)
 {
     struct err e;

@@ -111,7 +111,8 @@ static void give_texture(struct scene *s, float texel)
 
 enum { WAYS = 28 };
 
-/* Spoils make_scene() in one of those ways; a part of the line that it must cause. */
+/* Spoils a scene of make_scene() in one of those ways; returns a part of the error message that it
+ * must cause. */
 static const char *spoil(struct scene *s, int way)
 {
     switch (way) {
@@ -209,7 +210,7 @@ static float *number_of(struct scene *s, enum part part, size_t offset)
     return (float *)(void *)(base + offset);
 }
 
-/* No division by its size: bounds of 0. */
+/* A scene without surfaces is accepted; its bounds are 0. */
 TEST(nothing_is_a_scene)
 {
     OWN(scene) s = make_scene();

@@ -1,5 +1,5 @@
-/* What a texture shows, by another route: the image laid out as a lattice beyond its edges, and a sum over all of it of box or hat
- * functions around the centres of texels. */
+/* Texture lookup by another route: the image is repeated as a lattice beyond its edges, and the value is the sum over
+ * all its texels of a box or hat function around each centre. */
 #include "renderer/scene/texture.h"
 #include "tests/support/test.h"
 
@@ -49,7 +49,7 @@ static double by_lattice(const struct texture *t, double u, double v, int channe
     return sum;
 }
 
-/* Every wrap of both directions, from two images below to two above; no place on an edge of texels. */
+/* Every pair of wraps, for u and v from -2 to 2; no place lies on an edge between texels. */
 TEST(lookup_is_a_sum_over_the_lattice)
 {
     double most_off = 0;
@@ -76,7 +76,7 @@ TEST(lookup_is_a_sum_over_the_lattice)
     assert_true(most_off > 0.3); /* another wrap is seen */
 }
 
-/* Coordinates of a corner and beyond float's digits are texels of the image, whatever they are. */
+/* At corners, and at coordinates too large for float32 to resolve texels, some colour of the image comes back. */
 TEST(edges_and_far_places_are_within)
 {
     const float places[] = {0,     1,    -1,    2,      1e-9f, -1e-9f, 1 - 6e-8f,
@@ -92,8 +92,8 @@ TEST(edges_and_far_places_are_within)
     }
 }
 
-/* A ramp along u, texel i of n holds (i + 1/2)/n: bilinear it is u itself between the first and the last centre, so its mean over a
- * triangle there is u of the centroid. Nearest, over the whole image's two triangles: 1/2 together. */
+/* A ramp along u, texel i of n being (i + 1/2)/n: bilinear it is u itself between the first and the last centre, so
+ * its mean over a triangle is u at the centroid. Nearest: the means over the image's two triangles are 2/3 and 1/3. */
 TEST(mean_of_a_ramp)
 {
     float ramp[3 * 32];

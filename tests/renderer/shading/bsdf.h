@@ -18,7 +18,7 @@ float bsdf_pdf_w(const struct material *m, vec3 wo, vec3 wi);
 struct bsdf_sample bsdf_sample_direction(const struct material *m, bool front, vec3 wo, float u,
                                          float v, float lobe);
 
-/* No direction has f > 0: light sampling is in vain. */
+/* Whether f is 0 for every pair of directions, so that light sampling is useless. */
 bool bsdf_is_delta(const struct material *m);
 
 #endif

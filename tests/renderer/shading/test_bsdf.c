@@ -7,8 +7,8 @@
  * patches and the samples that leave below the surface, patches that expect fewer than 10 pooled);
  * the samples lost below the surface have the chance that the density leaves (z); the mean weight is
  * the integral of f cos (z). Alpha 1e-4 for the whole file, Bonferroni over TESTS. n = 40000: a
- * roughness off by 15 % has a noncentrality of several hundred, power 1 - 1e-9; it is the negative
- * control in every row, for plastics the shares of the lobes exchanged. */
+ * roughness off by 15 % has a noncentrality of several hundred, power 1 - 1e-9. It is the negative
+ * control in every row of metals; for plastics kd and ks exchanged, for diffuse the uniform density. */
 #include "bsdf.h"
 
 #include "renderer/shading/fresnel.h"
@@ -111,7 +111,7 @@ static double f_cos(const double wi[3], void *data)
     return (double)bsdf_eval(p->m, p->wo, to_float(wi)).g * wi[2];
 }
 
-/* Shares of the patches, and in the last place what is left to 1. */
+/* Integral of g over each patch, and in the last place 1 minus their sum. */
 static void shares(const struct optics_view *v, double (*g)(const double wi[3], void *),
                    struct pair *pair, double share[PATCHES + 1])
 {
@@ -124,8 +124,8 @@ static void shares(const struct optics_view *v, double (*g)(const double wi[3], 
     share[PATCHES] = 1 - sum;
 }
 
-/* Upper tail of the chi-square statistic; places with fewer than 10 expected are one place, which
- * joins the fullest if it is itself too small. */
+/* p-value of Pearson's chi-square; bins with fewer than 10 expected are pooled, and the pool joins the
+ * fullest bin if it still expects fewer than 10. */
 static double chi_square_tail(const int count[PATCHES + 1], const double share[PATCHES + 1])
 {
     double x = 0, rest = 0, fullest = 0, fullest_count = 0;
@@ -161,7 +161,7 @@ struct drawn {
     double mean, std_error; /* of the weight */
 };
 
-/* Every sample is also held against value and density: weight = f cos / pdf_w. */
+/* Every sample is also checked against value and density: weight = f cos / pdf_w. */
 static struct drawn draw(const struct material *m, const struct optics_view *v, uint32_t row)
 {
     struct drawn d = {0};
@@ -312,8 +312,8 @@ TEST(values_and_reciprocity)
     }
 }
 
-/* f = kd/pi + ks D G / (4 cos cos), sampled by shares in proportion to the largest colours; the
- * mirror's share of the samples has the weight kr over that share. */
+/* f = kd/pi + ks D G / (4 cos cos); lobes are chosen in proportion to the largest channels of kd, ks and
+ * kr; a mirror sample has the weight kr over the probability of the mirror lobe. */
 TEST(plastic_is_the_sum_of_its_lobes)
 {
     int told = 0, rounds = 5000;
@@ -389,15 +389,15 @@ static double over_all(const struct optics_view *v, struct facet *f)
     return sum;
 }
 
-/* The starter code's: a pi where a sqrt(pi) belongs, a = 1/(alpha tan). */
+/* The starter code's Lambda, with pi where sqrt(pi) belongs; a = 1/(alpha tan(theta_o)). */
 static double lambda_of_the_assignment(double alpha, double cos_o)
 {
     double a = cos_o / (alpha * sqrt(1 - cos_o * cos_o));
     return 0.5 * (exp(-a * a) / (a * M_PI) - erfc(a));
 }
 
-/* The facets of a unit of surface have its area as their projection [Heitz14 eq. 7], and those that
- * are visible its area seen from wo, cos_o [Heitz14 eq. 14]. */
+/* The projected area of all facets on a unit of surface is 1 [Heitz14 eq. 7]; that of the facets visible
+ * from wo, projected towards wo, is cos_o [Heitz14 eq. 14]. */
 TEST(facets_cover_the_surface)
 {
     for (int kind = 0; kind < 2; kind++)
@@ -426,7 +426,7 @@ TEST(facets_cover_the_surface)
     assert_true(fabs(over_all(&v, &f) / v.cos_o - 1) > 3e-2);
 }
 
-/* On purpose: its shadowing with that masking, by its text G = 1/(1 + lambda + lambda) in double precision. */
+/* --starter: the starter code's shadowing with that Lambda, G = 1/(1 + Lambda(wo) + Lambda(wi)), in double. */
 TEST(starter_code_shadows_as_its_header_says)
 {
     for (int i = 0; i < ANGLES; i++)
@@ -489,8 +489,8 @@ TEST(nothing_becomes_nan)
     }
 }
 
-/* A cosine of c is only known to a few float steps; near the critical angle, where the slope of R
- * is infinite, that is what counts. */
+/* A cosine is known only to a few float steps, which dominates the error near the critical angle, where the
+ * slope of R is infinite. */
 static bool near_fresnel(double got, double cos_i, double complex n)
 {
     double low = optics_fresnel(fmax(0, cos_i * (1 - 3e-7)), n);
@@ -554,7 +554,7 @@ TEST(dielectric_in_closed_form)
             if (sine > n * 0.999)
                 continue;
             assert_true(fabs((double)r + optics_transmitted(c, n) - 1) < 2e-5);
-            /* Flatter, the rounding of cos_t is too much of cos_i. */
+            /* At more grazing angles the rounding of cos_t is amplified too much in cos_i. */
             if (c < 0.1)
                 continue;
             float back = fresnel_dielectric(cos_t, (float)(1 / n), &back_t);

@@ -23,8 +23,8 @@ static void give_sky(struct scene *s, struct environment *env)
     build_light(s, (struct light){.kind = LIGHT_ENVIRONMENT});
 }
 
-/* Nothing but sky over a plate that reflects rho, or around a sphere: rho L, whatever the depth, as
- * neither sees itself. Beside the sphere: L. */
+/* Nothing but a sky of radiance L over a plate of albedo rho, or around a sphere: they show rho L at every
+ * depth, as neither sees itself. Beside the sphere: L. */
 TEST(constant_sky)
 {
     struct err e;
@@ -84,8 +84,8 @@ TEST(uneven_sky)
 /* One bright texel of 32 x 16, a tent of half width d = pi/16 around theta_c and 2 pi/32 in
  * azimuth: E = L 2pi/32 int (1 - |x|/d) sin(theta_c + x) cos(theta_c + x) dx
  *         = L 2pi/32 (sin(2 theta_c)/2) sin(d)^2/d,
- * which is L times solid angle times cosine for a small one. Sampled well: a standard error of
- * less than 1 % from 65536 paths, where uniform directions leave 10 %. */
+ * which for a small texel is L times solid angle times cosine. Light sampling has a standard error of
+ * less than 1 % from 65536 paths; uniform directions leave about 4 %. */
 TEST(bright_texel)
 {
     struct sky sky = {.width = 32, .height = 16};
@@ -111,9 +111,8 @@ TEST(bright_texel)
     }
 }
 
-/* What one looks at in direction w: nothing but sky; by a mirror; through glass of index 1; and,
- * where the sky is constant, by glass of index 1.5 that absorbs nothing, inside which light is
- * reflected again and again. Light sampling has no part in it. */
+/* What the camera sees in direction w: the sky directly, in a mirror, or through a ball of glass of index 1.
+ * Light sampling has no part in it. */
 enum view { VIEW_SKY, VIEW_MIRROR, VIEW_NO_GLASS, NUM_VIEWS };
 
 static struct scene catalogue_view_scene(enum view view, vec3 w, float reflectance)
@@ -233,8 +232,8 @@ static struct scene corner_scene(void)
     return s;
 }
 
-/* A constant environment, and a sphere of radius 50 around everything that emits the same to its
- * inside: two ways through the code, one image. 32 x 24 pixels, 256 samples, standard error of the
+/* A constant environment, and a sphere of radius 50 around the scene that emits the same radiance inwards:
+ * two ways through the code to the same image. 32 x 24 pixels, 256 samples, standard error of the
  * difference about 0.2 %. */
 TEST(sky_or_sphere_of_emitters)
 {
@@ -332,7 +331,7 @@ TEST(triangles_of_a_mesh_lamp_by_area)
     light_table_free(t);
 }
 
-/* One light for the place p with the unit normal n, by 0 <= u < 1, and with what probability. */
+/* Chooses a light for the point p with unit normal n by the number 0 <= u < 1; *probability: how likely it was. */
 static uint32_t choose_light(const struct light_clusters *c, vec3 p, vec3 n, float u,
                              float *probability)
 {
@@ -350,9 +349,9 @@ static float choice_probability(const struct light_table *t, uint32_t l, vec3 p,
     return chosen_probability(t->all, l, p, n, all);
 }
 
-/* At a plate's middle a lamp of each kind is chosen in proportion to its irradiance there, a closed form each: I cos/d^2,
- * of small lamps L A cos cos/d^2 (within 1 %), of a small sphere L pi r^2 cos/d^2, of a constant sky pi L; and lights below it,
- * or that look away, not at all. */
+/* At a plate's middle a light of each kind is chosen in proportion to its irradiance there, in closed form: I cos/d^2
+ * of a point (its falloff aside), L A cos cos/d^2 of a small lamp (within 1 %), L pi r^2 cos/d^2 of a small sphere,
+ * pi L of a constant sky. Lights below the plate, or facing away from it, are never chosen. */
 TEST(choice_is_by_irradiance)
 {
     struct err e;
@@ -429,10 +428,10 @@ static vec3 random_point(uint32_t i, uint32_t k)
     return mesh_random_point(11, i, k);
 }
 
-/* 300 spots, points, spheres and lamps of any size and direction in a cube, 200 places in it with normals: whatever a light's own
- * sample finds before the surface, that light may be chosen there; probabilities sum to 1, and lights come as often as they say
- * (4096 numbers in equal steps, of which each of 32 clusters may gain or lose one at its ends, and each light of it another).
- * Control: with the normal turned round, lights that send something are left out. */
+/* 300 spots, points, spheres and lamps of any size and direction in a cube, and 200 points with normals in it: a
+ * light whose own sample reaches the front of the surface has a positive probability there; probabilities sum to 1,
+ * and lights are chosen as often as they say (4096 numbers in equal steps; rounding at the ends of a cluster and of a
+ * light may cost one each). Control: with the normal reversed, lights that do contribute are left out. */
 TEST(no_light_is_left_out)
 {
     enum { N = 300, PLACES = 200, STEPS = 4096 };
@@ -506,9 +505,9 @@ static double rectangle_irradiance(vec3 p, float width, float depth)
     return check_irradiance(v, 4);
 }
 
-/* 60 point lights below 40 rectangular lamps that face down, of powers from 1 to 1000, over a
- * plate: nothing is in anything's way, so the sum of the closed forms. All of them sampled, one
- * chosen by place, and what the renderer does by itself, which is the latter to the bit. */
+/* 60 point lights below 40 rectangular lamps that face down, over a plate; intensities and radiances each
+ * span nearly three decades. Nothing is shadowed, so the closed forms add up. With all lights sampled, with
+ * one chosen by place, and with the renderer's default, which here is the latter to the bit. */
 TEST(a_hundred_lights)
 {
     OWN(scene) s = check_plate(v3(0, 1, 0), 0.6f);
@@ -628,8 +627,9 @@ TEST(textured_lamp_over_textured_plate)
     }
 }
 
-/* A textured lamp's triangles by the mean of their texels, a tenth by area: of four equal ones on texels of 0, 1, 3 and 4, whose mean
- * is 2, so 0.1, 0.55, 1.45 and 1.9 of a quarter each; the sample's density is that of the place found again. */
+/* A textured lamp's triangles are chosen by 0.1 of their area plus 0.9 of their mean texel over the lamp's mean: of
+ * four equal ones on texels of 0, 1, 3 and 4 (mean 2) with 0.1, 0.55, 1.45 and 1.9 times 1/4. A sample's pdf is that
+ * of pdf_of_light() at its point. */
 TEST(triangles_of_a_textured_lamp_by_mean)
 {
     enum { STEPS = 4000 };

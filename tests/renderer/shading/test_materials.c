@@ -225,8 +225,8 @@ TEST(glass_ball_in_a_furnace)
             }
 }
 
-/* In glass of index n radiance is n^2 as large: all of it in equilibrium. Rays from 0.3 off the centre
- * meet the surface at sines below 0.3 < 1/n, so that all get out. */
+/* In glass of index n equilibrium radiance is n^2 times that outside. Rays from a point 0.3 off the centre meet
+ * the surface with sin(theta) <= 0.3 < 1/n, so none is totally reflected. */
 TEST(camera_inside_glass)
 {
     for (int kind = 0; kind < 2; kind++) {
@@ -378,7 +378,7 @@ TEST(plastic_plate_in_a_furnace)
             for (int c = 0; c < 3; c++)
                 check_mean(&r, c, (1 << c) * (kd[c] + ks[c] * lobe + kr),
                            direct_kind_names[direct]);
-            /* Negative controls: no highlight's loss, and the whole off by 5 %. */
+            /* Negative controls: a highlight that loses nothing, and the whole off by 5 %. */
             if (direct >= DIRECT_BSDF) {
                 assert_false(check_agrees(&r, 1, 2 * 1.05 * (kd[1] + ks[1] * lobe + kr)));
                 assert_true(lobe > 0.95 || !check_agrees(&r, 1, 2 * (kd[1] + ks[1] + kr)));
@@ -475,8 +475,8 @@ TEST(lamp_in_a_rough_plate)
     }
 }
 
-/* The same lamp in plastic: kd r^2/d^2 cos of its radiance from the diffuse part, ks times the lobe's; the mirror image
- * passes it by. */
+/* The same lamp in plastic: kd L (r/d)^2 cos from the diffuse lobe, ks times the integral of the rough one; the
+ * mirror direction misses the lamp. */
 TEST(lamp_in_a_plastic_plate)
 {
     const double centre[3] = {0.5, 1.2, 1.5}, wo[3] = {0, -sin(50 * DEGREE), cos(50 * DEGREE)};

@@ -32,9 +32,9 @@ enum { SIZE = 32 };
 #define BRIGHT 51.0
 #define PART   0.02
 
-/* Every pixel has the same law with rare bright samples: 51 with probability 0.02, else 1; mean 2,
- * variance 0.02 * 0.98 * 50^2 = 49. A wall of radiance 1, before it a strip across each column of
- * pixels, 2 % of a pixel wide, of radiance 51. */
+/* Every pixel has the same distribution with rare bright samples: 51 with probability 0.02, else 1; mean 2,
+ * variance 0.02 * 0.98 * 50^2 = 49. The scene: a wall of radiance 1, and in front of it, along each column of
+ * pixels, a strip of radiance 51 that is 2 % of a pixel wide. */
 static void rare_bright_samples(struct fixture *f)
 {
     f->scene = build_scene();
@@ -103,7 +103,7 @@ struct stop {
     bool has_pilot;
 };
 
-/* At once; but a pilot is let through, since one that is stopped starts again. */
+/* Asks to stop at once, but lets a pilot finish, since a stopped pilot starts again from nothing. */
 static bool at_once(void *arg)
 {
     const struct stop *s = arg;
@@ -116,8 +116,8 @@ static const struct render_id some_id = {.scene = "5ce4e",
                                          .seed = "77",
                                          .cell = "0 0 32 32 of 32 32"};
 
-/* Stopped after every pass, written, read and gone on with, with 1 and 2 threads in turn: the same bits
- * as without. Plain, with layers, with the assignment's rule, with a pilot. */
+/* A render that is stopped after every pass, written, read and resumed, by 1 and 2 threads in turn, has the same bits
+ * as an uninterrupted one: plain, with layers, with the assignment's adaptive rule, with a pilot. */
 TEST(resumed_equals_uninterrupted)
 {
     struct fixture f;
@@ -183,7 +183,8 @@ static bool near(const double *a, const double *b, size_t num, double tolerance)
     return true;
 }
 
-/* Counts, targets and the first object as they are, sums to the rounding of some twenty additions: a sample is at most BRIGHT. */
+/* Counts, targets and first objects are equal; sums agree within the rounding of their additions, no sample being
+ * above BRIGHT. */
 static bool near_films(const struct film *a, const struct film *b)
 {
     enum { SUMS = sizeof(struct first_hit_sums) / sizeof(double) };
@@ -386,10 +387,10 @@ static struct estimate rule_in_closed_form(void)
 }
 
 /* H0: the mean over 1024 independent pixels is 2. Two-sided z at alpha = 1e-3 (3.29). The rule stops more
- * than half of the pixels after 32 dim samples; its bias (-0.50, by the closed form) is some 28 standard
- * errors, so it is rejected with power 1, and that is the negative control. The pilot's mean is not, with
- * a standard error near 0.03: half of the rule's bias would be seen with power 1 - 1e-7, a tenth hardly
- * ever. */
+ * than half of the pixels after 32 dim samples; its bias (-0.50, by the closed form) is 29 standard
+ * errors, so it is rejected with power 1: that is the negative control. The pilot's mean must not be
+ * rejected; its standard error is near 0.03, so half of the rule's bias would be found with power 1 - 1e-6, a tenth
+ * of it hardly ever. */
 TEST(rule_is_biased_and_pilot_is_not)
 {
     const double truth = DIM + PART * (BRIGHT - DIM);
@@ -481,8 +482,8 @@ TEST(layers_of_a_wall)
     drop(&f);
 }
 
-/* What a surface sends back of light that comes along its normal, whatever the direction seen from: of a metal
- * ((eta-1)^2 + k^2)/((eta+1)^2 + k^2), of glass R = ((n-1)/(n+1))^2 of what it reflects and 1 - R of what it lets through. */
+/* The albedo layer is the reflectance at normal incidence, whatever the view: of a metal
+ * ((eta-1)^2 + k^2)/((eta+1)^2 + k^2), of glass R x reflectance + (1 - R) x transmittance, R = ((n-1)/(n+1))^2. */
 TEST(albedo_layer_of_materials)
 {
     static const struct {

@@ -65,15 +65,15 @@ TEST(rectangle_light)
                 io.light_samples = l;
                 struct check_result film = check_look(&s, io, 8, 4096);
                 check_mean(&film, 1, expected, direct_kind_names[direct]);
-                /* Negative control: the assignment's pdf lacks 1/d, so its image is brighter by a
-                 * mean distance of about 1.1 here; 5 % would already be rejected. */
+                /* Negative control: the assignment's pdf lacks a factor of the distance, so its image would be
+                 * 1.25 (first lamp) and 0.53 times (second) as bright; 5 % would already be rejected. */
                 assert_false(check_agrees(&film, 1, 1.05 * expected));
             }
     }
 }
 
-/* E = pi L (r/d)^2 cos(theta) for a sphere wholly above the horizon [a uniform sphere is seen as a
- * disk of that solid angle's projection]. */
+/* E = pi L (r/d)^2 cos(theta) for a sphere of uniform radiance wholly above the horizon, d from the
+ * point to its centre. */
 TEST(sphere_light)
 {
     static const float centre[3][3] = {{0, 1, 0}, {0.8f, 0.9f, -0.3f}, {0, 0.35f, 0.2f}};
@@ -94,7 +94,8 @@ TEST(sphere_light)
     }
 }
 
-/* Point: rho/pi I cos/d^2. Directional: rho/pi E cos. No noise but that of the pixel's width. */
+/* Point light: rho/pi I cos/d^2. Directional: rho/pi E cos. The only noise is from the size of the
+ * pixel. */
 TEST(delta_lights)
 {
     OWN(scene) s = check_plate(v3(0, 1, 0), 0.7f);
@@ -113,7 +114,7 @@ TEST(delta_lights)
     }
 }
 
-/* A plate between light and patch: no light; taken away from the line of sight: all of it. */
+/* A plate between light and patch blocks all light; moved out of the line of sight, none. */
 TEST(shadow)
 {
     for (int blocked = 0; blocked < 2; blocked++) {

@@ -3,7 +3,8 @@
  * light and a spot light. Two images are compared by the mean of each channel over each quarter of
  * the image, 12 numbers. H0: the means are equal. Two-sided, alpha = 1e-6 each (|z| < 4.89), one
  * seed each, fixed n, no retry. With 1024 samples of 24 x 18 pixels the standard error of each
- * difference is below 1.5 % (checked), so that a quarter off by 10 % is found with 96 %. */
+ * difference is below 1.5 % (checked), so a quarter that is off by 10 % is found with power
+ * 0.96 at least. */
 #include "tests/support/render_check.h"
 #include "tests/support/own.h"
 #include "tests/support/test.h"
@@ -84,7 +85,7 @@ static vec3 turned(vec3 v, bool mirrored)
     return add(add(scale(v, c), scale(cross(k, v), s)), scale(k, dot(k, v) * (1 - c)));
 }
 
-/* The same for points, and lengths grow by `size`. */
+/* The same for points, scaled by `size` and then translated. */
 static vec3 moved(vec3 p, float size, bool mirrored)
 {
     return add(scale(turned(p, mirrored), size), v3(3, -2, 5));
@@ -194,8 +195,9 @@ TEST(rigid_motion_and_scale)
     moments_free(&m);
 }
 
-/* The channels know nothing of each other but in how far a path goes on, which is symmetric, and in
- * the choice of one of many lights, of which there are too few here: so the bits are the same. */
+/* Channels interact only in the survival probability of a path, which is symmetric in them, and in
+ * the choice of one of many lights, for which there are too few here: so permuted channels have the
+ * same bits. */
 TEST(channels_permute)
 {
     static const int permutations[][3] = {{1, 2, 0}, {2, 1, 0}, {0, 2, 1}};

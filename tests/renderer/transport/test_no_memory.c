@@ -1,6 +1,6 @@
-/* Memory that runs out in any of the renderer's own allocations, one after the other: what it is asked for fails with a line
- * that speaks of memory, or is the same as ever; and no block stays. Whole commands, and allocations of libraries, are the
- * matter of tests/end_to_end/no_memory.c. */
+/* Each of the renderer's own allocations fails in turn: the call fails with one line that mentions memory, or its
+ * result is the usual one; and nothing leaks. Whole commands, and allocations of libraries:
+ * tests/end_to_end/no_memory.c. */
 #include "renderer/bvh/bvh.h"
 #include "renderer/collada/collada.h"
 #include "renderer/pathtracer/checkpoint.h"
@@ -56,7 +56,7 @@ static BARE void *keep(bool own, void *p)
     return p;
 }
 
-/* Of any block, NULL too. */
+/* Forgets a block that is freed; p may be NULL or not one of ours. */
 static BARE void let_go(const void *p)
 {
     if (num_held == 0) /* nor lock */
@@ -99,10 +99,10 @@ BARE void free(void *p)
     MALLOC_BELOW(free)(p);
 }
 
-/* What is tried; on success *digest tells whether it is the same. */
+/* The operation under test. On success *digest is a checksum of its result. */
 typedef bool action(const void *arg, double *digest, struct err *e);
 
-/* Each allocation, or of many the first, the last and some between. */
+/* Runs the action once for each allocation that fails; of many allocations the first, the last and some between. */
 static void try_all(const char *name, action *act, const void *arg, long least)
 {
     struct err e = {0};

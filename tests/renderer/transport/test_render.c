@@ -89,8 +89,8 @@ TEST(counts_are_right)
     }
 }
 
-/* Mean over the image of each of `count` replicates with seeds of their own; their mean and its
- * variance. */
+/* Renders `count` replicates with different seeds: *mean is the mean of their image means, *var the variance of
+ * that mean. */
 static void replicates(const struct scene *s, struct how how, int count, double *mean, double *var)
 {
     double m2 = 0;
@@ -109,8 +109,8 @@ static void replicates(const struct scene *s, struct how how, int count, double 
 }
 
 /* H0: Sobol and independent samples have the same mean. Welch's t of 32 replicates each, 16 samples;
- * alpha = 1e-6 two-sided, 6.2 for the 31 degrees of freedom that are there at least; one fixed set of
- * seeds. The relative standard error is about 0.25 %, so 2 % is found with certainty. */
+ * |t| < 6.2, which has p = 7e-7 (two-sided) at 31 degrees of freedom, Welch's least number here; one fixed
+ * set of seeds. The relative standard error is about 0.25 %, so 2 % (t = 8) is found with power 0.96. */
 TEST(samplers_agree)
 {
     OWN(scene) s = room();
@@ -129,7 +129,7 @@ TEST(samplers_agree)
     assert_true(fabs((mean[2] - mean[0]) / sqrt(var[0] + var[2])) > 6.2);
 }
 
-/* Sum over pixels of the variance between two images with different seeds. */
+/* Sum over pixels and channels of the variance, estimated from two images with different seeds. */
 static double noise(const struct scene *s, struct how how)
 {
     OWN(moments) a = image(s, how, NULL);
@@ -143,8 +143,8 @@ static double noise(const struct scene *s, struct how how)
 
 /* Direct light at 64 samples: 3600 pixel channels, so the ratio of two such sums is known to about
  * 10 % even where a tenth of the pixels has most of the noise. Sobol has to have less than half, and
- * independent samples with another seed neither half nor twice (negative control). The moments say
- * that their M2 is no error. */
+ * independent samples with another seed neither half nor twice (negative control). The moments of Sobol
+ * images are marked "stratified": their M2 gives no standard error. */
 TEST(sobol_has_less_noise)
 {
     OWN(scene) s = room();

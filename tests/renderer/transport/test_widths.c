@@ -195,7 +195,7 @@ static int machine_isas(enum isa isa[MAX_ISAS])
     return n;
 }
 
-/* One image of every set of instructions and, as the negative control, of the next seed. */
+/* The image of every instruction set has the bits of one lane's; negative control: the next seed's has not. */
 static void compare(const struct scene *s, struct how how)
 {
     enum isa isa[MAX_ISAS];
@@ -271,7 +271,7 @@ TEST(depths_and_threads_do_not_matter)
     }
 }
 
-/* More shadow rays than paths, in a batch that never was full: a thread's first tile, at the image's edge. */
+/* More shadow rays than paths, in a thread's first batch, which is only partly filled because the image is small. */
 TEST(small_images_with_several_light_samples)
 {
     OWN(scene) s = all_kinds();

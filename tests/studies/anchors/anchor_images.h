@@ -27,11 +27,11 @@ struct anchor_job {
     const char *what; /* said while it runs (work.h); NULL: nothing */
 };
 
-/* The caller frees. */
+/* Renders the pool; the caller frees it with anchor_pool_free(). */
 NODISCARD bool anchor_render(const struct anchor_job *job, struct anchor_pool *out, struct err *e);
 void anchor_pool_free(struct anchor_pool *p);
 
-/* The standard deviation of one sample over the mean, of the image's luminance: a scene's noise. */
+/* A scene's noise: the standard deviation of one sample of luminance (RMS over pixels) over the image's mean. */
 double anchor_noise(const struct anchor_pool *p);
 
 enum anchor_error {

@@ -31,10 +31,10 @@ void mitsuba_z(const struct moments *a, const struct mitsuba_reference *r, doubl
 double mitsuba_critical_z(double level, size_t pixels);
 /* Channels that fail at that z. */
 size_t mitsuba_failures(const double *z, size_t pixels, double critical_z);
-/* The most channels that may fail. */
+/* The largest number of channels that may fail if the image is to pass. */
 size_t mitsuba_allowed(double share, size_t pixels);
-/* The critical z at and below which the image fails when `allowed` channels may: the (allowed+1)-th
- * largest. */
+/* The image fails at any critical z up to this one if `allowed` channels may fail: the (allowed + 1)-th largest
+ * z. */
 double mitsuba_score(const double *z, size_t pixels, size_t allowed);
 
 /* Eradiate, src/eradiate/test_tools/regression.py, class ZTest (read at commit 00b1015): the

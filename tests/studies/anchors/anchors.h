@@ -52,9 +52,9 @@ struct anchor_rule_row {
 };
 extern const struct anchor_rule_row anchor_rules[NUM_ANCHOR_RULES];
 
-/* A bias found with anchor_settings.power: the order statistic of the smallest biases found in each
- * pair, with its 95 % interval (binomial ranks, no law assumed). INFINITY: more than was tried.
- * Raised above the order statistic where the rule, asked again, finds it in fewer pairs. */
+/* The bias found with probability anchor_settings.power: that order statistic of each pair's smallest bias
+ * found, with its 95 % interval (binomial ranks, distribution-free). INFINITY: larger than was tried.
+ * Raised above the order statistic where the rule, asked again, finds it in fewer pairs than that. */
 struct anchor_bias {
     double b, lo, hi;
     int found; /* pairs in which the rule, asked again, finds b */
@@ -85,7 +85,7 @@ NODISCARD bool anchors_save(const char *path, const struct anchor_results *r, st
 /* Fails with a line on a missing file or member. */
 NODISCARD bool anchors_load(const char *path, struct anchor_results *r, struct err *e);
 
-/* The order statistics (from 0) of a sample of n that estimate the quantile p and bound it with 95 %:
+/* The ranks (from 0) of the order statistics of a sample of n that estimate the p-quantile and bound it with 95 %:
  * *at = ceil(p n) - 1; P(X(*lo) <= quantile) and P(X(*hi) >= quantile) are each at least 97.5 %. *hi is
  * n if no element is that far up. */
 void anchors_quantile_ranks(int n, double p, int *at, int *lo, int *hi);

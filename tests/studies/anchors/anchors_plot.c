@@ -33,7 +33,7 @@ static const struct anchor_outcome *outcome_of(const struct anchor_scene_result 
     return percent->bias[kind].b < fail->bias[kind].b ? percent : fail;
 }
 
-/* Whole decades around everything finite, in per cent. */
+/* A logarithmic axis in per cent, of whole decades, that holds all finite estimates and intervals. */
 static struct plot_axis axis_of(const struct anchor_results *r, enum anchor_error kind)
 {
     double lo = INFINITY, hi = -INFINITY;

@@ -109,7 +109,7 @@ static double gate(const struct moments *a, const struct moments *b, double alph
     return score;
 }
 
-/* -log10 p of flips, as `assay compare --same-program` has it: nothing where it declines. */
+/* -log10 p of the sign-flip test of `assay compare --same-program`; 0 where it declines to judge. */
 static double same_program(struct bench *t, const struct moments *a, const struct moments *b,
                            double alpha)
 {
@@ -227,8 +227,8 @@ static const struct moments *side_of(const struct measurement *m, int pair, int 
     return &m->pool.render[m->set->num_tune + 2 * pair + b];
 }
 
-/* How far the score is above the threshold (positive: the rule rejects), in roots: a score that is
- * -log10 p grows with the square of the error. */
+/* sqrt(score) - sqrt(threshold), positive where the rule rejects: the root, as a score of -log10 p grows with the
+ * square of the error. */
 static double excess(const struct measurement *m, struct bench *t, enum anchor_rule rule, int pair,
                      enum anchor_error kind, double b)
 {
@@ -241,8 +241,8 @@ static double excess(const struct measurement *m, struct bench *t, enum anchor_r
     return s > threshold ? fmax(root, 1e-9) : fmin(root, -1e-9);
 }
 
-/* The smallest error that the rule finds in this pair, to 1 %, from a guess: out from it by growing
- * steps, then in by halving and interpolation in turn. */
+/* The smallest error that the rule finds in this pair, to 1 %: brackets it from the guess by growing steps,
+ * then alternates interpolation and bisection. */
 static double smallest_found(const struct measurement *m, struct bench *t, enum anchor_rule rule,
                              int pair, enum anchor_error kind, double guess)
 {
@@ -348,8 +348,8 @@ static void confirm(struct measurement *m)
     }
 }
 
-/* Pair 0 alone first: its answers are where the search starts in all others, so that the record does
- * not depend on which thread comes when. */
+/* Pair 0 is measured first, alone: the searches of all others start from its answers, so that the record does
+ * not depend on thread scheduling. */
 static void measure_pairs(struct measurement *m, struct anchor_scene_result *out)
 {
     int n = m->set->num_pairs, at, lo, hi;

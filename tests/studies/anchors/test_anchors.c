@@ -375,7 +375,7 @@ TEST(test_page)
     }
 }
 
-/* A record that is damaged is a line, not a page. */
+/* A damaged record gives an error line, not a page. */
 TEST(test_damaged_record)
 {
     static struct anchor_results r;

@@ -24,8 +24,8 @@ struct bench_options {
 /* True if the scene was asked for. */
 bool bench_wanted(const struct bench_options *o, const char *scene);
 
-/* Each prints its table and gives what it shows, a new reference. *wrong: results differ, which is also
- * said; nothing is then timed. A failure to measure is a line in *e and NULL. */
+/* Each prints its table and returns the table's data, a new reference. *wrong: results differ; this is printed too,
+ * and nothing is then timed. If it cannot measure: NULL and a line in *e. */
 json_t *bench_rays(const struct bench_options *o, bool *wrong, struct err *e);
 json_t *bench_paths(const struct bench_options *o, bool *wrong, struct err *e);
 json_t *bench_jobs(const struct bench_options *o, bool *wrong, struct err *e);

@@ -1,5 +1,5 @@
-/* The programs that `make bench` holds against each other, behind one call: images of one view with seeds
- * of their own, and the CPU time of them. */
+/* The programs that `make bench` compares, behind one call: images of one view with distinct seeds, and their
+ * CPU time. */
 #ifndef ASSAY_BENCH_ENGINES_H
 #define ASSAY_BENCH_ENGINES_H
 
@@ -28,9 +28,9 @@ struct bench_view {
     struct embree_tracer *embree; /* NULL: cannot */
 };
 
-/* Renders count >= 3 images of spp samples, one after the other into images (3 floats a pixel), on one
- * thread. *cpu_s: of all of it; children, their start and what writes their input are part of it. work_dir
- * exists. */
+/* Renders count >= 3 images of spp samples a pixel on one thread, one after the other into images (3 floats
+ * a pixel). *cpu_s: total CPU seconds, with child processes, their start and the writing of their input.
+ * work_dir must exist. */
 NODISCARD bool bench_engine_render(enum bench_engine engine, const struct bench_view *v, int spp,
                                    int count, uint32_t seed, const char *work_dir, float *images,
                                    double *cpu_s, struct err *e);

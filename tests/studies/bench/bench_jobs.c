@@ -76,8 +76,8 @@ static bool paths_job(const struct bench_options *o, int i, json_t *jobs, struct
     return ok;
 }
 
-/* What brute force costs a camera ray over what the hierarchy does: time per ray, the hierarchy's over all rays of the
- * set, brute force's over every 997th. */
+/* Ratio of the time per camera ray of brute force to that of the hierarchy, the latter over all rays of the set,
+ * brute force over every 997th. */
 static bool brute_force_factor(const struct bench_scene *s, const struct bvh *wide, double *factor,
                                struct err *e)
 {

@@ -19,7 +19,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* relMSE = mean of (x - truth)^2/(truth^2 + 0.01) [Rousselle11 4]: so that black does not count for all. */
+/* relMSE = mean of (x - truth)^2/(truth^2 + 0.01) [Rousselle11 4]; the floor keeps black pixels from dominating. */
 static const double relmse_floor = 0.01;
 
 enum { FEW, MANY, NUM_RUNGS, COUNT = 4, MAX_ROUNDS = 9 };
@@ -139,7 +139,7 @@ static bool run(enum bench_engine engine, const struct bench_options *o, const s
     return true;
 }
 
-/* Mean over all values, and the variance of it by the spread between images. */
+/* Mean over all values, and *var, the variance of that mean from the scatter between images. */
 static double mean_of(const float *images, int count, size_t size, double *var)
 {
     double sum = 0, sum2 = 0;
@@ -154,7 +154,7 @@ static double mean_of(const float *images, int count, size_t size, double *var)
     return sum / count;
 }
 
-/* Values over sqrt(mean^2 + 0.01): their variance, without a bias, is relMSE. */
+/* Divides values by sqrt(mean^2 + 0.01), so that the MSE in these units is relMSE. */
 static void use_relmse_units(struct converge_reference *r)
 {
     for (size_t i = 0; i < r->size; i++) {
@@ -206,7 +206,7 @@ static bool judge(const struct bench_options *o, const struct bench_view *v,
     return ok;
 }
 
-/* Why an engine is left out, or NULL. */
+/* The reason why an engine is left out of a view; NULL: it is not. */
 static const char *absent(enum bench_engine engine, const struct bench_view *v)
 {
     char path[4096];

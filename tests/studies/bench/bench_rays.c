@@ -1,6 +1,6 @@
 /* Rays per second of BVH_WIDE against Embree 3 [Embree], one ray at a time by its default flags and by
- * ROBUST, on one thread; time to build and size. A set of rays of which 0.05 % find something else than
- * Embree's is not timed. */
+ * ROBUST, on one thread; time to build and size. A set of rays of which more than 0.05 % differ from
+ * Embree's answer is an error. */
 #include "bench.h"
 #include "bench_timing.h"
 #include "bench_tracers.h"

@@ -16,7 +16,7 @@ struct at_size {
     double triangles, build[2], mrays[2], bytes; /* 0: ours, 1: Embree's; seconds */
 };
 
-/* One mesh: the second bounce's kind of rays, from a terrain's surface in all directions. */
+/* One mesh, with incoherent rays as after the first bounce: from a terrain's surface in all directions. */
 static struct at_size measure_mesh(const struct bench_options *o, uint32_t triangles)
 {
     struct bench_scene of = {.scene = mesh_terrain((uint32_t)sqrt(triangles / 2.0), 1)};

@@ -1,5 +1,5 @@
-/* Sets of rays: camera rays tile by tile, as the renderer has them; cosine-distributed ones from what
- * these hit; shadow rays from there to one light. */
+/* Sets of rays: camera rays tile by tile, as in the renderer; cosine-distributed rays from their hits; shadow
+ * rays from there to one light. */
 #ifndef ASSAY_BENCH_SETS_H
 #define ASSAY_BENCH_SETS_H
 
@@ -34,8 +34,8 @@ struct answer_key answers_new(void);
 
 /* From the scene's own camera, or from outside at `size` (half the diagonal) about the middle. */
 void ray_set_camera(const struct bench_scene *of, vec3 middle, float size, struct ray_set *out);
-/* Rays that go on from what `in` hit: a cosine-distributed direction (bounce may be NULL), and one to
- * the light. */
+/* Rays that start where those of `in` hit: one in a cosine-distributed direction (bounce may be NULL), and one
+ * to the light. */
 void ray_set_go_on(const struct scene *s, const struct ray_set *in, const struct answer_key *a,
                    float size, vec3 light, uint32_t seed, struct ray_set *bounce,
                    struct ray_set *shadow);

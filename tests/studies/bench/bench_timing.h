@@ -4,9 +4,9 @@
 
 #include <stddef.h>
 
-/* CPU time of this thread. */
+/* CPU seconds of this thread so far. */
 double bench_cpu_seconds(void);
-/* Sorts x. */
+/* The median of n numbers; sorts x. */
 double bench_median(double *x, int n);
 /* Zeroed; aborts when out of memory. */
 void *bench_allocate(size_t size);

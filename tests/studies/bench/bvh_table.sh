@@ -1,7 +1,7 @@
 #!/bin/bash
-# What a hierarchy is worth: normal shading of the course's meshes, 800 x 600, 1 sample, all threads, by
-# every --accel, beside the seconds of the write-up that this project starts from (8 threads). The
-# meshes are not ours to ship: ASSAY_CS184 says where they are. Brute force takes a minute or two.
+# Speed-up by a hierarchy: normal shading of the course's meshes, 800 x 600, 1 sample, all threads, with
+# every --accel, beside the seconds of the write-up that this project started from (8 threads). The meshes
+# are not ours to distribute: ASSAY_CS184 says where they are. Brute force takes a minute or two.
 set -u
 pathtracer=$(realpath "${1:?usage: tests/studies/bench/bvh_table.sh BUILD}")/pathtracer
 root=${ASSAY_CS184:-../shared/scenes/cs184}

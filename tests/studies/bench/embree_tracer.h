@@ -1,7 +1,8 @@
 /* A path tracer as one writes it on Embree in an afternoon: one ray at a time, one function, no vectors of
  * its own. The light transport is that of `pathtracer --direct light -l 1` on diffuse scenes: cosine
- * directions, one point on each area light at every vertex, roulette by the root of the throughput from the third
- * vertex on, box filter. Its means are ours; nothing else is shared but camera_ray(). */
+ * directions, one point on each area light at every vertex, roulette from the third vertex on, whose survival
+ * probability is the largest component of the throughput, box filter. The expected image is ours; nothing else is
+ * shared but camera_ray(). */
 #ifndef ASSAY_EMBREE_TRACER_H
 #define ASSAY_EMBREE_TRACER_H
 

@@ -34,7 +34,7 @@ void check_proves_at_least(struct checks *c, double k, double n, double rate, co
 void check_that(struct checks *c, bool holds, const char *fmt, ...)
     __attribute__((format(printf, 3, 4)));
 
-/* "holds" or "**does not hold**", of the lines from number `from` on. */
+/* "holds" if all lines from number `from` on hold, else "**does not hold**". */
 const char *checks_word(const struct checks *c, int from);
 
 #endif

@@ -102,7 +102,7 @@ static void add_curve(struct drawing_series *s, const struct null_result *pool, 
     }
 }
 
-/* Of rates over what was asked for, both as logarithms. */
+/* A drawing of observed rates against the levels asked for, on logarithmic axes. */
 static struct drawing rates_drawing(void)
 {
     return (struct drawing){.x.is_log = true,

@@ -1,5 +1,5 @@
-/* False alarms of what stands around one comparison: two stages with fresh seeds (tools/sequential/two_stage.h), and the
- * permutation of replicates (tools/exact/permutation.h). */
+/* False alarms of the procedures around one comparison: two stages with fresh seeds (tools/sequential/two_stage.h),
+ * and the permutation test of replicates (tools/exact/permutation.h). */
 #ifndef ASSAY_CALIBRATE_GATE_H
 #define ASSAY_CALIBRATE_GATE_H
 

@@ -18,8 +18,8 @@ extern const double null_level[NUM_LEVELS]; /* 1e-2, 1e-3, 1e-4 */
 /* The p-values of many pairs. null_pair() may be called from several threads for different pairs. */
 struct null_run {
     enum weakness weakness;
-    /* The first of them are run at this level. 0: the level is read off the run at LEVEL_SHAPE, whose
-     * guard against skewness lets more through than that of a smaller alpha. */
+    /* The first pairs[l] pairs are run at level l. 0: the level is read off the run at LEVEL_SHAPE, whose
+     * guard against skewness is less strict than at a smaller alpha. */
     size_t pairs[NUM_LEVELS];
     float *log10_p[NUM_LEVELS]; /* NUM_COLUMNS a pair */
     float *mean_t;              /* of the image's luminance, at LEVEL_SHAPE */

@@ -9,7 +9,7 @@
 #include <math.h>
 #include <string.h>
 
-/* "0.0103 [0.0081, 0.0128]" */
+/* One table cell, the rate and its 99.9 % Clopper-Pearson interval: "0.0103 [0.0081, 0.0128]". */
 static void rate_cell(FILE *f, double k, double n)
 {
     if (n > 0)
@@ -77,7 +77,7 @@ static void column_table(FILE *f, const struct null_result *r)
     fputs("\n", f);
 }
 
-/* Counts of every statistic in every cell. */
+/* Prints the table of rejections by every statistic in every cell. */
 static void count_table(FILE *f, const struct null_result *r, int num)
 {
     fputs("| pairs |", f);

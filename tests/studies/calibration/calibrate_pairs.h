@@ -1,4 +1,5 @@
-/* Many pairs shared out as jobs, and what they count: in any order, by any number of threads, the same. */
+/* Many pairs distributed as jobs, and their counts, which depend neither on the order nor on the number of threads.
+ * */
 #ifndef ASSAY_CALIBRATE_PAIRS_H
 #define ASSAY_CALIBRATE_PAIRS_H
 

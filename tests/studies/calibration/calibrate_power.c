@@ -136,7 +136,7 @@ static bool in_first_tile(size_t p)
     return p % SIDE < TILE && p / SIDE < TILE;
 }
 
-/* Brings all but the first tile nearer to the mean, a hundredfold: its interval reaches furthest out. */
+/* Divides the noise of all but the first tile by 100, so that the first tile's interval reaches furthest out. */
 static void quieten(struct moments *m)
 {
     for (size_t i = 0; i < 3 * SIDE * SIDE; i++)

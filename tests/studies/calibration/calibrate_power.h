@@ -33,15 +33,16 @@ struct power_result {
 NODISCARD bool power_run(struct work *w, const struct power_cell *cell, enum weakness weakness,
                          size_t pairs, size_t blocks, struct power_result *out, struct err *e);
 double power_cost(const struct power_cell *cell, size_t pairs);
-/* The bias found with 95 %, between the points by the normal quantile of the rate; 0 if not reached. */
+/* The bias, in units of the MDB, at which 95 % are found, interpolated in the normal quantile of the rate; 0 if not
+ * reached. */
 double power_95(const struct power_result *r);
 /* A bias of the MDB is found in at least 95 %; 1.1 of it is proved to be and 0.9 of it not to be, so
  * that the bias found with 95 % is within 10 % of the MDB. Colour: the last is not asked, as the MDB
  * is an upper bound where the channels are independent. */
 void power_check(const struct power_result *r, struct checks *c);
 
-/* Images of 16 x 16 pixels, tiles of 8. Coverage: all equal; the first tile's noise is ten times that
- * of the others, so that its interval reaches furthest and is the one printed. */
+/* Images of 16 x 16 pixels, tiles of 8. Coverage: equal means; the first tile's noise (sd) is a hundred times
+ * that of the others, so that its interval reaches furthest and is the one printed. */
 struct cover_cell {
     enum law law;
     int n_a, n_b; /* n_b = 0: the exact mean. Multiples of 64 where above 64 */

@@ -10,7 +10,7 @@ struct render_cell {
     const char *scene; /* of the suite */
     int side, spp;     /* side x side pixels, spp samples on both sides */
     int replicates;    /* 0: B is like A; else B is that many replicates of spp samples each */
-    uint64_t seed;     /* the cell's seeds are its 2^32 successors' */
+    uint64_t seed;     /* its seeds are (seed << 32) + 0 .. 2^32 - 1 */
 };
 
 /* The suite in `scenes` ("reference/scenes"). Every pair runs at all levels. */

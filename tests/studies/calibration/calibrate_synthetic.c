@@ -142,7 +142,7 @@ static bool tail_part(void *arg, int part, size_t first, size_t end, double coun
                           .n_min = cell->n_a,
                           .z_guard = {[STATISTIC_PYRAMID] = guard}};
     struct rect rect = {0, 0, 8, 8};
-    /* Below this |t| no p is small: no need to know it. */
+    /* Below this |t| p exceeds every level, so it need not be computed. */
     double least = 0.9 * stats_normal_quantile(tail_level[0] / 2);
     for (size_t i = first; i < end; i++) {
         struct cell sum = {0};

@@ -63,7 +63,7 @@ static void weaken(enum weakness weakness, struct moments *m, bool is_b)
         snprintf(m->unit, sizeof m->unit, "exact");
 }
 
-/* The verdict and p-values of a tester that puts 10^shift alpha for the alpha it is asked for. */
+/* The verdict and p-values of a tester that uses 10^shift alpha in place of the alpha asked for. */
 static bool run_shifted(const struct moments *a, const struct moments *b,
                         const struct compare_options *opt, double shift, struct outcome *out,
                         struct err *e)

@@ -1,5 +1,5 @@
-/* The tester under measurement: compare_moments() as it is, or weakened on purpose. A calibration that
- * accepts one of the weakened is no calibration. */
+/* The tester under measurement: compare_moments() as it is, or weakened on purpose. A calibration is only
+ * worth something if it rejects each weakened tester. */
 #ifndef ASSAY_CALIBRATE_TESTER_H
 #define ASSAY_CALIBRATE_TESTER_H
 

@@ -1,9 +1,9 @@
 /* The calibration itself: its mathematics against known values, the short version on the tester as it
  * is and on testers weakened on purpose, each of which must be rejected, and the published page.
  * Seeds and numbers of pairs (calibrate.c) were fixed beforehand, nothing is retried. A line
- * fails by chance with 5e-4 at most where a rate is just what it may be; most are far below, so that
- * the short version of a right tester fails with about 1 %, over all its lines. What it can find
- * is what the weakened testers show. */
+ * fails by chance with at most 5e-4, where a rate is exactly at its limit; most are far below, so that
+ * the short version fails a right tester with about 1 % over all its lines. Its power is shown by the
+ * weakened testers. */
 #include "calibrate.h"
 #include "tests/support/rates.h"
 
@@ -114,7 +114,7 @@ TEST(test_short_calibration)
                         sizeof r.margin[0].equivalent);
 }
 
-/* Negative controls: among the lines that fail must be the one that the weakness is about. */
+/* Negative controls: the lines that fail must include the one that this weakness violates. */
 static void expect_caught(enum weakness weakness, const char *line)
 {
     static struct results r;

@@ -1,4 +1,4 @@
-/* Jobs shared out among threads, with one line that says how far they are. */
+/* Jobs distributed among threads, with a progress line. */
 #ifndef ASSAY_TESTS_WORK_H
 #define ASSAY_TESTS_WORK_H
 

@@ -20,9 +20,9 @@ sys.path.insert(0, os.path.join(HERE, "../../../reference/pairs"))
 from pairs_image import read_png  # noqa: E402
 
 SIZE, SAMPLES = 64, 16
-# Two silhouettes are the same if this share of what either covers is covered by both.
+# Two silhouettes are the same if intersection over union is at least this.
 ALIKE, SILHOUETTE_SIZE = 0.88, 128
-# An image is another one where more than this share of pixels differs by more than the suite's own 5 of 255.
+# Two images are different if more than this share of pixels differs by more than the suite's own 5 of 255.
 SHARE, STEP = 0.01, 5
 JUDGE = re.compile(r'CompareImagesAgainst\(context, "([^"]+)"(?:, None, None, 5, \w+(?:, (True|False))?)?\)')
 

@@ -79,7 +79,8 @@ static bool is_adaptive(const struct source *of)
     return rubric_is_adaptive(&of->course->rubric.image[of->image]);
 }
 
-/* Of adaptive images, which take long, as many as of others. */
+/* Samples a pixel: those asked for; at QUARTER a quarter of them, or a 16th of an adaptive image's, and LEAST_SPP at
+ * least. */
 static int samples_of(const struct source *of, enum depth depth)
 {
     int spp = of->course->rubric.image[of->image].spp, quarter = spp / (is_adaptive(of) ? 16 : 4);
@@ -133,7 +134,7 @@ static bool is_same(const struct source *of, const struct answer_options *bug, b
     return true;
 }
 
-/* For the variance of one image: c->n is to that of an image as the variances are. */
+/* The variance of a cell's mean in one image of the spp asked for: scaled by the ratio of sample counts. */
 static double of_one(const struct rubric *r, int image, const struct signature *s, int i)
 {
     return s->var[i] * s->n / ((double)r->image[image].spp * s->cell * s->cell);
@@ -319,7 +320,7 @@ static bool make(struct maker *m, const char *patches, struct err *e)
            catalogue_write(out.s, &m->made, e);
 }
 
-/* That the directory of the catalogue is not there is a mistake: it is made before. */
+/* A missing catalogue directory would be a mistake of the rubric, so it is made before. */
 static bool read_course(struct maker *m, const char *path, int variant, bool plain, struct err *e)
 {
     struct rubric_mistakes mistakes = {0};

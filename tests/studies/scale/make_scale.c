@@ -20,7 +20,7 @@ static const double launch_s = 0.5; /* from one task's end to the next one's beg
 static const double node_fails_s = 30 * 86400.0; /* mean time between failures of a node */
 static const double noticed_s = 300;             /* SlurmdTimeout where nobody has set it */
 static const double away_s = 3600;
-static const double price_h = 0.04; /* of a processor and hour, in whatever money */
+static const double price_h = 0.04; /* per processor and hour, in any currency */
 
 struct work {
     const char *name;
@@ -66,7 +66,8 @@ static void sink(struct cluster *c, int i)
     }
 }
 
-/* One array from time `begin` on: jobs todo[0 .. num-1], of which those that are lost come back in todo; their number. */
+/* Runs one array of the jobs todo[0 .. num-1] from time *begin on. Returns how many were lost; todo then holds
+ * those. */
 static int run_round(struct cluster *c, const double *cost, int *todo, int num, double *begin,
                      struct outcome *o)
 {

@@ -141,7 +141,7 @@ expect "a render that looks at all of its image" 3 "cannot be cut into jobs" "$s
 expect "what cannot be planned" 3 "begins with pathtracer, grade, validate or reference" "$san_assay" plan report x.json
 expect "a word that a plan uses" 3 "means something else in a plan" "$san_assay" plan --plan "$tmp/p1" pathtracer -f x.exr -e "{out}" -s 1 "{job}"
 
-# The class: what is right, what is dead, what is no program.
+# The class: submissions that are right, that crash, and that are not programs.
 mkdir "$tmp/class"
 cp "$pathtracer" "$tmp/class/right" && printf '#!/bin/sh\nexit 3\n' >"$tmp/class/dead" && chmod +x "$tmp/class/dead" && mkdir "$tmp/class/empty" && echo later >"$tmp/class/empty/note"
 no_times() { sed -E 's/"(cpu_s|wall_s|seconds|seconds_a|seconds_b|a)": [0-9.e-]+//; /"(command|date|key)":/d' "$1"; }
@@ -157,7 +157,7 @@ for f in grades.json right/grade.json dead/grade.json empty/grade.json; do
 done
 for f in grades.csv right/point.png; do cmp -s "$tmp/g1/$f" "$tmp/g2/$f" || why="$why $f differs"; done
 [ -e "$tmp/g2/index.html" ] || why="$why no page"
-# hash_tree.h, by other means.
+# The hash of hash_tree.h, computed independently.
 hash=$(printf 'f %s note\n' "$(sha256sum "$tmp/class/empty/note" | cut -c1-64)" | sha256sum | cut -c1-64)
 grep -q "\"$tmp/class/empty\":\"$hash\"" "$tmp/jobs" || why="$why no hash of a directory"
 if grep -q "no sandbox" "$tmp/err.g1"; then

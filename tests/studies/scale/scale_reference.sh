@@ -64,7 +64,7 @@ why=$(diff <(no_times "$tmp/l/41_cornell/manifest.json") <(no_times "$tmp/x/41_c
 grep -q '"passed": true' "$tmp/x/41_cornell/manifest.json" || why="$why no test of independence"
 tell "the manifest but for times" "$why"
 
-# What is up to date has no job, and gather says what the command would.
+# A reference that is up to date gets no job, and gather prints what `assay reference` would.
 "$assay" plan --plan "$tmp/none" "${words[@]}" --out "$tmp/y" --golden "$tmp/x" >"$tmp/jobs" 2>&1
 tell "what is up to date has no job" "$(grep -q '"jobs":0' "$tmp/jobs" && [ "$(wc -l <"$tmp/jobs")" -eq 1 ] || cat "$tmp/jobs")"
 "$assay" "${words[@]}" --out "$tmp/y" --golden "$tmp/x" >"$tmp/said" 2>&1
@@ -73,7 +73,7 @@ tell "and is told of as without jobs" "$(cmp "$tmp/said" "$tmp/out" 2>&1; grep -
 rm -r "$tmp/x/41_cornell"
 expect "a reference that was up to date" 3 "was up to date when this was planned" "$san_assay" gather "$tmp/none"
 
-# What is not done, or not what it says. sign: the receipt of somebody who means harm (hash_tree.h).
+# Jobs that are missing or whose files do not match. sign: forges the receipt of a job (hash_tree.h).
 plan=$tmp/cycles
 artefact() { echo "$plan/jobs/$(sed -n "s/^{\"job\":$1,\"key\":\"\([0-9a-f]*\)\".*/\1/p" "$plan/plan.jsonl")"; }
 sign() {

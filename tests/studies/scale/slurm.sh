@@ -27,7 +27,7 @@ trap 'exit 1' INT TERM
 
 what=slurm
 . tests/end_to_end/expect.sh
-# until SECONDS COMMAND...: as soon as it succeeds
+# until SECONDS COMMAND...: waits until the command succeeds, SECONDS at most
 until_so() {
     local end=$((SECONDS + $1))
     shift
@@ -105,12 +105,12 @@ kill -9 $(pgrep -P $follower) $follower 2>/dev/null
 wait $follower 2>/dev/null
 follow >"$tmp/out" 2>"$tmp/err" &
 follower=$!
-# In order: what it has heard in the last seconds before a kill -9 it forgets.
+# Shut down in order: after a kill -9 the controller forgets what it heard in the last seconds.
 { kill "${daemon[ctld]}" && wait "${daemon[ctld]}"; } 2>/dev/null
 sleep 1
 start_controller
 until_so 30 one_runs
-# The last task that has begun runs longest from now.
+# The task that has begun last will run longest from now on.
 victim="" lost=""
 begun() {
     local task log node
@@ -144,7 +144,7 @@ tell "what was lost was submitted again" "$why"
 [ -n "$victim" ] && start_node "$victim"
 until_so 60 idle_nodes 4
 
-# pathtracer hands over by itself; its plan goes when all is done.
+# pathtracer submits by itself; its plan is removed when all is done.
 "$pathtracer" -q -r 64 64 -s 16 -f l2.exr -f l2.png "$scene" >/dev/null
 why=$("$pathtracer" -q -r 64 64 -s 16 --slurm 3 -f x2.exr -f x2.png "$scene" 2>&1 >/dev/null) && why=""
 cmp -s l2.png x2.png || why="another image: $why"

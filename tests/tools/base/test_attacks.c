@@ -1,6 +1,7 @@
-/* Attacks on whoever runs a submission, a line each, which has won if its exit status is 0: as a build and as a run, in the sandbox and
- * without namespaces. Control: outside, for root, those marked 'c' do win, or a line would hold because it is written wrongly. What uses up
- * limits, and what stays behind, is in test_sandbox.c. */
+/* Attacks on whoever runs a submission, one line of shell each; an attack has won if it exits with 0. Tried as a
+ * build and as a run, in the sandbox and without namespaces. Control: outside, as root, those marked 'c' win, so
+ * that none fails merely because it is badly written. Exhausting limits and leaving things behind are in
+ * test_sandbox.c. */
 #define _GNU_SOURCE
 
 #include "renderer/base/fs.h"
@@ -238,7 +239,7 @@ TEST(without_namespaces)
     try_all(true, true);
 }
 
-/* Only what reads, of our own. */
+/* Tries only the attacks marked 'c', on files of our own. */
 TEST(outside_they_win)
 {
     if (geteuid() != 0)

@@ -198,8 +198,8 @@ TEST(a_busy_loop_ends_by_processor_time)
     assert_int_equal(run_with("trap '' XCPU; while :; do :; done", limit, NULL).end, SANDBOX_CPU);
 }
 
-/* Every copy starts two more. The number that ran at a time cannot pass the limit: the kernel says "cannot
- * fork". What is left of it is gone when the run returns. */
+/* Every copy starts two more. No more than the limit can run at a time, as the kernel refuses to fork; what
+ * is left of them is gone when the run returns. */
 TEST(a_fork_bomb_stays_inside)
 {
     struct sandbox_limits limit = small;
@@ -242,7 +242,7 @@ TEST(memory_is_bounded_for_one_process_and_for_all)
     struct sandbox_result r = run(
         "head -c 1G /dev/zero | tail -n 1 | wc -c >out.png; [ \"$(cat out.png)\" -gt 900000000 ]");
     assert_int_not_equal(r.end, SANDBOX_OK);
-    /* Four with 100 MB each, under 256 MiB for each of them. */
+    /* Four with 150 MB each: every one is below the limit of 256 MiB, together they are above. */
     r = run(
         "for i in 1 2 3 4; do (head -c 150M /dev/zero; sleep 20) | tail -n 1 >/dev/null & done; wait");
     assert_int_equal(r.end, SANDBOX_MEMORY);
@@ -313,7 +313,7 @@ TEST(a_folder_of_the_system_can_be_hidden)
     assert_true(atoi(kept("out.png")) > 3);
 }
 
-/* Other people's renderers, which a program might run: what is installed is seen by builds alone. */
+/* Installed programs, such as other renderers that a submission might run, are visible to builds alone. */
 TEST(only_a_build_sees_compilers)
 {
     static const char look[] =
@@ -369,7 +369,7 @@ TEST(what_is_installed_can_be_hidden)
     assert_true(fs_remove_tree(lib, &e));
 }
 
-/* All that a run sees but for libraries, /proc and its shell's programs, of which each has to be of a list. */
+/* Everything that a run sees, except libraries and /proc, must be in a list; so must the shell's programs. */
 TEST(a_run_sees_what_is_listed_and_nothing_else)
 {
     static const char list[] =
@@ -442,7 +442,7 @@ TEST(only_two_places_can_be_written)
     assert_non_null(strstr(kept("out.png"), "0000000000000000"));
 }
 
-/* Its words are not taken for the supervisor's, nor a file named like its report. */
+/* Neither the program's output nor a file named like the supervisor's report is taken for that report. */
 TEST(a_made_up_report_is_not_believed)
 {
     struct sandbox_result r =
@@ -472,7 +472,7 @@ TEST(a_tree_goes_from_one_run_to_the_next)
     assert_false(too_large);
 }
 
-/* On request, and only then: time and file size are bounded, the rest is open. */
+/* The unsafe mode, only on request: time and file size are bounded, the rest is open. */
 TEST(unsafe_is_as_unsafe_as_it_says)
 {
     struct sandbox s;
@@ -481,7 +481,7 @@ TEST(unsafe_is_as_unsafe_as_it_says)
                      SANDBOX_OK);
     assert_string_equal(kept("out.png"), "hello");
     assert_int_equal(run("exec head -c 100G /dev/zero >out.png").end, SANDBOX_FILE_SIZE);
-    /* Of root only that is left that nobody has: no file of ours, and no way back. */
+    /* Root is replaced by an otherwise unused user: no file of ours can be read, and there is no way back. */
     const struct path secret = fs_path("%s/secret", s.dir.path);
     test_write(secret.s, "mine", 4);
     assert_int_equal(chmod(secret.s, 0600), 0);
@@ -520,7 +520,8 @@ TEST(a_folder_that_is_swapped_leads_nowhere)
     leave(&s);
 }
 
-/* Processes, files where everybody may write, System V objects. Control: of another user they stay. */
+/* Processes, files in world-writable folders and System V objects are removed. Control: those of another user stay.
+ * */
 TEST(nothing_of_a_run_without_namespaces_is_left)
 {
     only_root();
@@ -540,8 +541,8 @@ TEST(nothing_of_a_run_without_namespaces_is_left)
     leave(&s);
 }
 
-/* Four hold 150 MB each at the same time. No process has more than it may, and there are no namespaces in which somebody adds
- * them up: the kernel does. Control: two. */
+/* Four processes hold 150 MB each at the same time. None exceeds its own limit, and without namespaces only the
+ * kernel's memory group can add them up. Control: two processes. */
 TEST(memory_of_all_is_bounded_without_namespaces)
 {
     only_root();

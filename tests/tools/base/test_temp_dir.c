@@ -108,7 +108,7 @@ TEST(what_a_kill_left_is_removed_by_the_next)
     assert_true(temp_dir_close(&d, &e));
 }
 
-/* What has such a name and is no such directory. */
+/* Other things with such a name, a link and a longer name, are left alone. */
 TEST(nothing_else_is_removed)
 {
     struct temp_dir d;

@@ -1,5 +1,6 @@
-/* The manuals of files (tools/docs/formats): the real reader takes every example, and a page's tables list what the reader knows,
- * no key more, none less. What a reader knows is asked of it: every word in quotes in its folder is tried as a key. */
+/* The manuals of file formats (tools/docs/formats): the real reader accepts every example, and a page's tables list
+ * exactly the keys that the reader knows. These are found by trying every quoted word in the reader's source folder
+ * as a key. */
 #include "tests/support/suite_files.h"
 #include "tests/support/own.h"
 #include "tests/support/test.h"
@@ -173,8 +174,8 @@ static void compare(const char *page, const char *heading, const char *const *fo
     assert_string_equal(difference(&listed, &known), listed.word[listed.num]);
 }
 
-/* In any object of the example below `at`: is the whole still not told to have an unknown key when it has this one, with
- * a value that nothing has? */
+/* Is there an object of the example below `at` that may have this key, with a nonsense value, without the reader
+ * reporting an unknown key? */
 static bool is_known_in(json_t *whole, json_t *at, const char *word, bool (*reads)(json_t *whole))
 {
     bool known = false;
@@ -445,7 +446,7 @@ static json_t *example_results(void)
     return results;
 }
 
-/* A reader of results does not mind what it does not know: what it knows is what it refuses as it is. */
+/* A reader of results ignores unknown keys, so the keys that it knows are those whose wrong value it refuses. */
 static bool refuses_results(json_t *results)
 {
     struct err e;

@@ -7,7 +7,7 @@
 #include "tests/support/simulate.h"
 #include "tests/support/test.h"
 
-/* Fails the test where there can be no comparison. */
+/* The comparison of a with b, to be freed by the caller; fails the test if it cannot be made. */
 static inline struct comparison compare(const struct moments *a, const struct moments *b,
                                         struct compare_options opt)
 {
@@ -17,7 +17,7 @@ static inline struct comparison compare(const struct moments *a, const struct mo
     return c;
 }
 
-/* simulate() of both. */
+/* Fills both sides with n samples a pixel of the law, of mean 1, the same law and mean on both. */
 static inline void simulate_pair(struct moments *a, struct moments *b, enum law law, int n,
                                  bool is_grey, uint64_t *seed)
 {

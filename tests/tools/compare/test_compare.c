@@ -140,8 +140,8 @@ TEST(test_pyramid_brute_force)
     }
 }
 
-/* Bands have the cells of the image's own pyramid, bit for bit, up to two levels above those that only they have; and what
- * is made of their tiles are the levels above. From the floats of a file as from doubles. */
+/* A pyramid built from bands has the cells of the whole image's pyramid, bit for bit, and the levels above tiles
+ * built from their tiles are the image's too; from the floats of a file as from doubles. */
 TEST(test_pyramid_of_bands)
 {
     const int sizes[][3] = {{37, 100, 16}, {21, 153, 16}, {33, 71, 4}, {9, 200, 32}, {50, 90, 10}};
@@ -394,7 +394,7 @@ TEST(test_one_value_each)
 }
 
 /* Rounding noise (relative sd 1e-8 of an observation) around values 1e-7 apart: hundreds of standard
- * errors, and nothing. Control: 1e-3 apart is DIFFERENT. */
+ * errors, yet no difference. Control: 1e-3 apart is DIFFERENT. */
 TEST(test_rounding_noise)
 {
     OWN(moments) a = new_moments(4, 4, "sample"), b = new_moments(4, 4, "sample");
@@ -436,10 +436,11 @@ TEST(test_skew_guard)
         }
 }
 
-/* Where p has to be raised, a pixel is only as harmless as what lies around it. 16 x 16 pixels, n = 1000 against the exact
- * value, one of them 8 standard errors too dark with |g| = 0.01: x is about 5, so |g| x^3/3 = 0.4. If all pixels are so, it is
- * tested and is DIFFERENT. Beside pixels with |g| = 1 it must be luck: no test, and of what is around it |g| is 0.25 at
- * least up to the image, of which 8/16 standard errors are nothing. */
+/* Where p has to be raised for skewness, a pixel is trusted only as far as the regions around it. 16 x 16 pixels, n
+ * = 1000 against the exact value, one pixel 8 standard errors too dark with |g| = 0.01: x is about 5, so |g| x^3/3 =
+ * 0.4. If all pixels have this |g|, it is tested and DIFFERENT. Among pixels with |g| = 1 its small |g| must be
+ * luck: no test there, nor in the regions around it, whose |g| is at least 0.25; in the image the pixel is only 8/16
+ * standard errors. */
 TEST(test_harmless_by_luck)
 {
     OWN(moments) a = new_moments(16, 16, "sample"), b = new_moments(16, 16, "exact");
@@ -482,10 +483,10 @@ static struct moments others(uint64_t *seed)
     return m;
 }
 
-/* 16 samples against replicates of the same mean (H0): in 0.95^16 = 44 % of the pixels all are alike, so that A has no noise there
- * and is 5 % too bright, 160 standard errors of B's. None of 10 pairs at alpha 1e-3 is DIFFERENT (P of one 1 %; all were before such
- * regions were told). A as a closed form, 1/0.95 everywhere, has no such excuse; 5 % more light, 28 standard errors of the
- * image's mean, is found. */
+/* H0: 16 samples against replicates of the same mean. In 0.95^16 = 44 % of the pixels all 16 are equal, so that A
+ * shows no noise there and is 5 % too bright, 160 standard errors of B. None of 10 pairs at alpha 1e-3 may be
+ * DIFFERENT (one would have a probability of 1 %; before such regions were recognized all were). Controls: an exact
+ * A of 1/0.95 everywhere, and 5 % more light, 28 standard errors of the image's mean, are found. */
 TEST(test_all_alike_by_luck)
 {
     uint64_t seed = 11;
@@ -579,8 +580,8 @@ TEST(test_margin_between)
     }
 }
 
-/* INCONCLUSIVE with few samples turns EQUIVALENT with the factor it asks for, in at least 90 % of 60
- * claims (planned for 95 %; below 51 of 60 by chance 7e-4 at a true 95 %). Control: a quarter of that
+/* A claim that is INCONCLUSIVE with few samples becomes EQUIVALENT with the factor it asks for. Planned for
+ * 95 %; 60 claims, of which fewer than 51 have a probability of 7e-4 at 95 %. Control: a quarter of that
  * factor leaves most INCONCLUSIVE. Normal law sd 0.3, n = 8 on 16 x 16, margins 2 % and 10 %. */
 TEST(test_extra_factor)
 {

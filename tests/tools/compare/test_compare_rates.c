@@ -225,9 +225,9 @@ static struct verdict_rate rate_with_bias(double bias, bool one_tile, bool grey,
     return r;
 }
 
-/* H0: the bias lies outside the margin; here just outside, where it is hardest. alpha = 0.05, 2000
- * claims each, normal law, n = 16 each: standard error 0.66 % (image) and 2.7 % (tile). EQUIVALENT
- * at most alpha. The image's own interval is no more cautious than it should be: inside with alpha.
+/* H0: the bias lies outside the margin, here just outside, the hardest case. alpha = 0.05, 2000 claims
+ * each, normal law, n = 16 a side: standard error 0.66 % (image) and 2.7 % (tile). EQUIVALENT at most
+ * alpha. The image's own interval is not conservative: it lies inside the margin with probability alpha.
  * A DIFFERENT at the edge of the margin is wrong as well: at most alpha.
  * Controls: without bias EQUIVALENT in at least 95 % (the margins are 4.5 and 5.6 standard errors);
  * with twice the margin DIFFERENT in at least 95 % (a test at alpha over at most 1364 regions needs

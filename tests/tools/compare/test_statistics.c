@@ -66,8 +66,8 @@ struct size_case {
 
 /* H0: equal means and equal variances. Each statistic's own p <= 1 % in at most 1 % of 2000 claims, on an
  * image with edges and colours, 16 x 16, in which the noise is proportional to radiance. The interval
- * of the variance ratio holds 1 in at least its 98 %. A statistic that tests nothing at all in a row is
- * no proof of its size: dense and directed must test in all rows but those named. */
+ * of the variance ratio holds 1 in at least its 98 %. A row in which a statistic
+ * tests nothing says nothing about its size: dense and directed must test in all rows but those named. */
 TEST(test_sizes)
 {
     enum { SIDE = 16, CLAIMS = 2000 };
@@ -167,9 +167,9 @@ TEST(test_dense_power)
     assert_true(4 * pyramid < found[1]);
 }
 
-/* With margins every pixel may be off by them: at 5 % in each, up or down at random, H0 holds for pixels and
- * tiles of 4 (margins 5 %) but for no dense statistic without margins. At most 1 % of 500 claims. Control:
- * with margins of 1 % all are found: pixels are off by 0.04/0.0265 = 1.5 standard errors more. */
+/* Every pixel may be off by the margin. With 5 % in each, up or down at random, and margins of 5 %, H0 holds for
+ * pixels and tiles of 4, though not without margins. Dense rejects in at most 1 % of 500 claims. Control: with
+ * margins of 1 % all are found, as pixels exceed them by 0.04/0.0265 = 1.5 standard errors. */
 TEST(test_dense_margin)
 {
     enum { SIDE = 16, N = 256, CLAIMS = 500 };
@@ -344,8 +344,8 @@ TEST(test_amounts)
 /* Power: the shift statistic's T is normal with mean sqrt(sum D^2/v) up to the noise in the direction. The
  * columns of test_amounts, with 0.5 for 0.8, moved by 0.1 pixels: D = 0.5 k 0.1 cos(..), v = (0.3 B)^2 2/64; the sum over
  * 14 x 14 inner pixels, computed below. Of 400 claims the statistic finds what that predicts at
- * alpha share / 13 tests, less what 5 % of noise in the direction may cost: within Clopper-Pearson of the interval
- * [power at 0.93 T, power at T]. Control: 0 pixels, at most alpha. */
+ * alpha share / NUM_ERROR_MODES tests, less what 5 % of noise in the direction may cost: within Clopper-Pearson of
+ * the interval [power at 0.93 T, power at T]. Control: a shift by 0 pixels, at most alpha. */
 TEST(test_directed_power)
 {
     enum { SIDE = 16, N = 64, CLAIMS = 400 };
@@ -386,8 +386,8 @@ TEST(test_directed_power)
     assert_true(lower_bound(found[0], CLAIMS) <= 0.01);
 }
 
-/* A bias of the margin in every pixel, upward: inside the margins, and the direction "scale" is just that.
- * At most alpha = 1 % of 500 claims; twice the margin is found by it in all. */
+/* A bias of exactly the margin, upward in every pixel, is within the margins and lies in the direction "scale".
+ * It is DIFFERENT in at most alpha = 1 % of 500 claims; twice the margin is found by that statistic in all. */
 TEST(test_directed_margin)
 {
     enum { SIDE = 16, N = 64, CLAIMS = 500 };
@@ -481,8 +481,8 @@ TEST(test_variance_ratio)
     assert_int_equal(found, tested);
 }
 
-/* Independent sides of any law and few samples are never called alike; sides that share 90 % of their noise, or all but
- * a factor of 1.001, are: E (A - B)^2 is then 2 (1 - .9) of the variance of one side. */
+/* Independent sides, of any law and with few samples, are never said to share noise; sides that share 90 % of it, or
+ * all but a factor of 1.001, are: at 90 % E (A - B)^2 is 2 (1 - .9) of the variance of one side. */
 TEST(test_noise_shared)
 {
     enum { SIDE = 24 };
@@ -559,9 +559,9 @@ TEST(test_shared_seeds)
 }
 
 /* alpha = 1e-9: a bias of the printed MDB is found by the image's test in 95 % of 500 claims, as at 1e-2,
- * and half of it is not. And p has no floor: a bias of 1000 standard errors of normal noise has, by the
- * tail of the normal law, log10 p = -1e6/2/ln 10 = -217147 within 1 % (nu = 61440 lowers it: the exact
- * Student tail is compared with its own closed form below). */
+ * and half of it in less than 5 %. And p has no floor: a bias of 1000 standard errors has log10 p = -217147
+ * by the normal law, and about -38000 by Student's with nu = 61440, to whose leading order it is compared,
+ * within 3 %. */
 TEST(test_small_alpha)
 {
     enum { SIDE = 16, N = 121, CLAIMS = 500 };
@@ -586,7 +586,7 @@ TEST(test_small_alpha)
     assert_true(lower_bound(found[0], CLAIMS) <= 0.95 && upper_bound(found[0], CLAIMS) >= 0.95);
     assert_true(upper_bound(found[1], CLAIMS) < 0.05);
 
-    /* Student's tail at t >> sqrt nu: nu/2 ln(nu/t^2) to leading order; here t = 1000, nu = 2 120 256. */
+    /* Student's tail, ln p = -(nu + 1)/2 ln(1 + t^2/nu) to leading order; t = 1000, nu = 2 x 120 x 256. */
     double se = 0.3 * sqrt(2.0 / N / (SIDE * SIDE)), nu = 2.0 * (N - 1) * SIDE * SIDE;
     for (int p = 0; p < 3 * SIDE * SIDE; p++)
         a.mean[p] = b.mean[p] + 1000 * se;
@@ -598,8 +598,8 @@ TEST(test_small_alpha)
     assert_true(c.statistic[STATISTIC_CHI_SQUARE].log10_p < -1000);
 }
 
-/* 512 x 512, 8 replicates a side: below 0.5 s and 200 MiB on an idle core. The bounds here are for a busy
- * machine, and with a sanitizer for that. */
+/* 512 x 512, 8 replicates a side: below 0.5 s and 200 MiB on an idle core. The bounds below allow for a busy
+ * machine, or for a sanitizer. */
 TEST(test_cost)
 {
 #ifdef __SANITIZE_ADDRESS__

@@ -1,5 +1,5 @@
-/* The depth ladder of a furnace, whose closed form is E (1 - rho^(d+1))/(1 - rho) at every depth d, rendered by the program
- * beside this test; and its plot, read by libxml2. */
+/* The depth ladder of a furnace, whose radiance at depth d is E (1 - rho^(d+1))/(1 - rho), rendered by the program
+ * beside this test; and its plot, read back by libxml2. */
 #include "reference/suite/suite.h"
 #include "renderer/base/fs.h"
 #include "tools/converge/depth_ladder.h"
@@ -21,9 +21,10 @@ static double number(const json_t *rungs, size_t i, const char *name)
     return json_number_value(v);
 }
 
-/* H0: the mean at each depth is the closed form of the suite's 11_furnace, within its standard error (an upper bound) and
- * 1e-5 for single precision. Two-sided at 1e-6 over 6 depths: 5.2 standard errors. n: 16 x 16 pixels of 16 samples, one
- * seed. Control: one bounce more or fewer, a change of at least 0.2^5 in blue and 0.8^5 in red, is rejected everywhere. */
+/* H0: the mean luminance at each depth is the closed form of the suite's 11_furnace, within its standard error (an
+ * upper bound) and 1e-5 for single precision. alpha 1e-6 two-sided over 6 depths: 5.2 standard errors. n: 16 x 16
+ * pixels of 16 samples, one seed. Control: one bounce more or fewer, at least 0.8^6/2 in red (0.04 in luminance), is
+ * always rejected. */
 TEST(furnace)
 {
     struct err e = {""};

@@ -27,7 +27,7 @@ static bool header_line(const char *line, const char *key, char *out, size_t siz
     return length > 0 && length < size;
 }
 
-/* Not the lines around a change nor their numbers, nor where the file stands. */
+/* Does the line of a patch belong to the bug? Context lines, line numbers and file names do not. */
 static bool is_of_the_bug(const char *line, bool in_code)
 {
     return !in_code || !(line[0] == ' ' || line[0] == '\n' || strncmp(line, "@@", 2) == 0 ||

@@ -203,8 +203,8 @@ TEST(test_an_average_of_sights)
 
 /* ---- looks drawn from the catalogue */
 
-/* How many times the variance that it states a cell's mean has under a bug: R, and as many times more as pixels
- * of a cell share their random numbers. */
+/* Variance of a cell's mean under a bug over the variance stated: R, times the factor by which the cell's pixels
+ * share random numbers. */
 static double understated(const struct fixture *f, int bug, int cell)
 {
     double factor = 1;
@@ -271,7 +271,7 @@ static bool is_named(const struct diagnosis *d, int bug)
     return false;
 }
 
-/* H0: correct. Each look accuses with at most 1e-6, so any of 500 with 5e-4. */
+/* H0: the renderer is correct. Each look names a bug with a probability of at most 1e-6, so any of 500 with 5e-4. */
 TEST(test_a_correct_look_is_not_accused)
 {
     struct fixture *f = *state;
@@ -385,7 +385,8 @@ TEST(test_other_noise_has_no_name)
     }
 }
 
-/* A bug at 40 % of its strength is the likeliest, at that strength, but is not named: put in, it does more. */
+/* A bug at 40 % of its strength is the likeliest, with that amplitude, but is not named, as the bug itself does
+ * more. */
 TEST(test_an_amplitude_is_found)
 {
     struct fixture *f = *state;

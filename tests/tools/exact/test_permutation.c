@@ -53,8 +53,9 @@ static struct permutation test_pair(const struct replicate_dir *a, const struct 
     return p;
 }
 
-/* |t| (two samples, pooled variance, from the definition) of the images with a bit set in `labels` against the other
- * three: the largest over the 4 + 1 squares (sides 1 and 2 of a 2 x 2 image). Grey, so channels add nothing. */
+/* Two-sample |t| with pooled variance, by its definition, of the three images whose bit is set in `labels` against
+ * the other three: the largest over the 4 + 1 squares of side 1 and 2 in a 2 x 2 image. Grey, so channels add
+ * nothing. */
 static double largest_t(const double v[6][4], int labels)
 {
     double best = 0;
@@ -139,9 +140,9 @@ static int count_rejected(enum law_of_images law, double scale, double alpha, in
     return rejected;
 }
 
-/* H0 holds exactly: P(p <= 5 %) = 12/252 = 4.76 % (a multiple of 2/252, ties aside). 2000 pairs a law:
- * 95 expected, sd 9.5; two-sided chance 1e-3: 65 to 128. Of fireflies only the
- * upper end is looked at. Negative control: A brighter by a third must go beyond. */
+/* H0 holds exactly: P(p <= 5 %) = 12/252 = 4.76 % (p is a multiple of 2/252, ties aside). 2000 pairs a
+ * law: 95 expected, sd 9.5; outside 65 to 128 with a probability below 1e-3. Fireflies tie, so only the
+ * upper end is checked. Negative control: A brighter by a third must exceed it. */
 TEST(test_level)
 {
     for (int law = 0; law < NUM_LAWS; law++) {
@@ -185,8 +186,8 @@ TEST(test_confirm)
     assert_int_equal(second.verdict, VERDICT_INCONCLUSIVE);
 }
 
-/* A tile that is off by its MDB is found with about 95 %, one by half of it less often: of 60 each, below 50 has less
- * than 1e-3 at 95 %. Tiles of 4 in 8 x 8 pixels. */
+/* A tile off by its MDB is found with about 95 %, one off by half of it less often. 60 of each: fewer than 50 have a
+ * probability of 2e-4 at 95 %. Tiles of 4 in 8 x 8 pixels. */
 TEST(test_tile_mdb)
 {
     uint64_t seed = 91;

@@ -59,9 +59,9 @@ TEST(test_bound_of_all_flips)
     assert_in_range(beyond, 50, 400);
 }
 
-/* n equal numbers of which k are negative: P = 2 P(Binomial(n, 1/2) <= k). The bound is above, and not by far: Chernoff's loses
- * sqrt(2 pi) t at most [BahadurRao60], and nothing where all signs are the same; the
- * saddle point's less than a factor of 2 where there are 1000. */
+/* n equal numbers of which k are negative: P = 2 P(Binomial(n, 1/2) <= k). The bound lies above it, but not far:
+ * Chernoff's by at most a factor of sqrt(2 pi) t [BahadurRao60], and by none where all signs agree; the saddle
+ * point's by less than a factor of 2 for n = 1000. */
 TEST(test_bound_of_equal_numbers)
 {
     static const int n[] = {20, 64, 300, 1000}, negative[] = {5, 20, 120, 450};
@@ -86,7 +86,7 @@ struct pair {
     float *rows[2];
 };
 
-/* Means of n draws, all three channels one. A's pixels inside `where` are brighter by the part `more`. */
+/* Pixels are means of n_a or n_b draws, equal in all channels; inside `where` A is multiplied by 1 + more. */
 static void draw_pair(struct pair *p, enum law law, int n_a, int n_b, double more,
                       struct rect where, uint64_t *seed)
 {
@@ -120,7 +120,8 @@ static struct sign_flip flip_pair(struct pair *p, double alpha, int filter_width
 
 static const struct rect everywhere = {0, 0, SIDE, SIDE};
 
-/* What the proof needs: exchanging A and B in some pixels flips the signs of their scores and changes nothing else. */
+/* The premise of the proof: exchanging A and B in some pixels flips the signs of their scores and changes nothing
+ * else. */
 TEST(test_scores_are_odd)
 {
     struct pair p, q;
@@ -192,8 +193,9 @@ static void smooth(float *pixel)
     memcpy(pixel, out, sizeof out);
 }
 
-/* Filtered pixels share noise: judged as if they did not, equal laws are told apart in most pairs (the control); one pixel in 3 x 3
- * is judged right. It is seen where nothing is said of a filter, and is not where there is none, with and without a difference. */
+/* Filtered pixels share noise. Judged as independent, equal laws are DIFFERENT in most pairs (the control); with one
+ * pixel of each 3 x 3 the level holds. The shared noise is detected where no filter was declared, and not detected
+ * in unfiltered images, with or without a difference. */
 TEST(test_filtered_pixels)
 {
     uint64_t seed = 31;
@@ -239,8 +241,9 @@ TEST(test_decision)
     assert_non_null(strstr(r.reason, "16 pixels"));
 }
 
-/* 20 pairs with A brighter by 40 % in 16 x 16 pixels at 5,9, on no grid, 16 draws of an exponential law: a pixel's difference has the
- * standard deviation sqrt(2/16) = 0.35 and T there the mean 0.4 sqrt(256)/0.39 = 16, where 7 is needed at 1e-6. */
+/* 20 pairs with A brighter by 40 % in 16 x 16 pixels at 5,9, on no grid, 16 draws of an exponential law. There a
+ * pixel's difference has mean 0.4, sd sqrt((1.4^2 + 1)/16) = 0.43 and root mean square 0.59, so T (of the difference
+ * itself) is about 0.4 sqrt(256)/0.59 = 11, where 7 is needed at 1e-6. */
 TEST(test_region)
 {
     uint64_t seed = 41;
@@ -255,8 +258,8 @@ TEST(test_region)
     }
 }
 
-/* Fireflies: 0.5, and 500 more in 0.1 % of the draws, 4 a pixel: the mean of all 1024 differences has a standard error of 35 %. The level
- * scores see 10 % at 1e-6, and the same in codes of 8 bits. */
+/* Fireflies: 0.5, and 500 more in 0.1 % of the draws, 4 draws a pixel: the mean of all 1024 differences has a
+ * standard error of 35 %. The level scores still find 10 % at 1e-6, in 8-bit codes too. */
 TEST(test_fireflies)
 {
     uint64_t seed = 51;
@@ -271,7 +274,7 @@ TEST(test_fireflies)
     }
 }
 
-/* Four times the samples and the same mean: another law. Exchanging the roles finds the same. */
+/* Four times the samples with the same mean is another law, and is found; with the sides exchanged too. */
 TEST(test_spread)
 {
     uint64_t seed = 61;
@@ -286,8 +289,8 @@ TEST(test_spread)
     }
 }
 
-/* A relative change of what is said to be found with 95 % is: 100 pairs, chance 1e-3 of fewer than 87. A third of it hardly: T has a
- * mean of (5.4 + 1.6)/3 = 2.3 where 5.4 is needed. */
+/* A change of the printed MDB is found with 95 %: 100 pairs, of which fewer than 87 have a probability of 5e-4. A
+ * third of it is hardly ever found: T has a mean of (5.4 + 1.6)/3 = 2.3 where 5.4 is needed. */
 TEST(test_smallest_detectable)
 {
     uint64_t seed = 71;

@@ -237,7 +237,7 @@ TEST_OF(fixture, a_table_compares_without_storing, setup, teardown)
     assert_float_equal(strtod(strchr(f->said, '+'), NULL), 10, 1); /* % */
 }
 
-/* Equal means, but margins far below what the noise of the two can show. */
+/* Equal means, but margins far below what can be resolved with the noise of the two. */
 TEST_OF(fixture, an_inconclusive_one_is_refused_whatever_is_said, setup, teardown)
 {
     render(f, f->golden, 1, 1);
@@ -268,7 +268,7 @@ TEST_OF(fixture, what_is_missing_or_damaged_is_refused, setup, teardown)
     assert_refused(f, APPROVE_IMPOSSIBLE, "nothing to compare with");
 }
 
-/* The stored one is of the scene as it was; only its size cannot be compared. */
+/* A stale reference is still what a candidate is compared with, unless its size has changed. */
 TEST_OF(fixture, a_stale_one_is_what_is_compared_with, setup, teardown)
 {
     strcpy(f->scene.sha256, "old");

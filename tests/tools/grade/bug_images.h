@@ -22,7 +22,7 @@ struct bug_images {
 bool bug_images_start(struct bug_images *b, const char *rubric);
 void bug_images_end(struct bug_images *b);
 
-/* -1: none. Fails the test if there is no bug of that name. */
+/* The bug's number in the catalogue. Fails the test if there is no bug of that name. */
 int bug_images_number(const struct bug_images *b, const char *name);
 
 /* Images with the deviations of a set and with bugs (-1: none). noise: variance over ours. Freed with bug_images_take_back(). */

@@ -1,5 +1,5 @@
-/* From images to points, with images whose truth is known: made here from gamma laws, written as 8-bit PNG by
- * the assignment's curve, and read back as a student's would be.
+/* From images to points, with images whose truth is known: drawn here from gamma laws, written as 8-bit PNG by
+ * the assignment's curve, and read back as a submission is.
  *
  * The scene: a gradient of mean .02 to .4, a lamp of radiance 8 in a corner. A sample is exponential (a pixel of spp of
  * them is gamma), one draw for all three channels. The reference has 4096 samples; noise is known from it alone. */
@@ -232,8 +232,9 @@ TEST(points_follow_the_interval)
     assert_true(score_chance(&wide, &between) == 1);
 }
 
-/* What is printed is the chance itself: 20 000 further runs, normal around the estimate, for each place of it. H0: they get
- * other points as often as it says; 5 standard deviations of that count (binomial), over 60 places, alpha below 1e-4. */
+/* The printed chance is that of different points in another run: 20 000 further runs, normal around the estimate,
+ * for each of 60 values of it. H0: the points change as often as printed; 5 binomial standard deviations, alpha
+ * below 1e-4 in all. */
 TEST(the_chance_is_that_of_another_run)
 {
     enum { RUNS = 20000 };
@@ -276,8 +277,8 @@ TEST(a_right_program_keeps_its_score)
     assert_true(r.chance > 1e-4);
 }
 
-/* H0: the interval of a check misses a true 0 with at most alpha, here 5 %, over all channels and tiles. 400 images; by
- * chance more than 34 have a probability below 1e-3 (binomial). Control: 3 % too bright. */
+/* H0: the interval of a check misses a true 0 with at most alpha, here 5 %, over all channels and tiles. 400 images:
+ * more than 34 misses have a probability of 1.1e-3 (binomial). Control: 3 % too bright. */
 TEST(a_right_image_keeps_its_points)
 {
     enum { RUNS = 400 };
@@ -372,9 +373,9 @@ TEST(points_follow_bias_not_variance)
     }
 }
 
-/* Run b of 2 S samples whose first S are those of run a have correlation sqrt(1/2); H0: independent runs are said to be correlated
- * beyond 6 standard deviations, which none of 100 may be. The same image off by a tenth: bias that is not as
- * fine as a pixel is no correlation. */
+/* A run of 2 S samples whose first S are those of another run has a correlation of sqrt(1/2) with it. H0: runs are
+ * independent; they are reported beyond 6 standard deviations, which none of 100 may reach. A common bias of a
+ * tenth, coarser than a pixel, is no correlation. */
 TEST(runs_that_share_samples_are_seen)
 {
     static uint8_t rgb8[2][3 * PIXELS];
@@ -696,7 +697,7 @@ TEST(growth_is_that_of_samples_alone)
     }
 }
 
-/* Files that are no images, and one that says it is large: the header alone is read. */
+/* Files that are not images, and one whose header claims a huge size: only the header is read. */
 TEST(bad_images_get_a_line)
 {
     static const unsigned char bomb[] = {

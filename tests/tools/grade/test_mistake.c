@@ -1,5 +1,5 @@
-/* One mistake is paid once: images made of the catalogue's effects, graded as submissions are. Checks of images that the
- * catalogue has not, and those that right images of flat cells do not pass, are left out. */
+/* One mistake costs points once: images made from the catalogue's effects, graded as submissions are. Checks of
+ * images that are not in the catalogue, and those that correct images of flat cells do not pass, are left out. */
 
 #include "tools/grade/carried.h"
 #include "tools/grade/mistake.h"
@@ -222,7 +222,8 @@ TEST(what_is_missing_is_not_carried_on)
     assert_true(share_of(&v, "second_bounce") == 0);
 }
 
-/* Nor where direct light, too dark by what -l asks for, is by chance as much below that image as bounces are above it. */
+/* Nor is it where direct light, too dark by 20 %, happens to lie as far below that image as the bounces lie above
+ * it. */
 TEST(an_image_without_bounces_is_not_carried_on)
 {
     struct submitted_images *h =
@@ -250,7 +251,7 @@ TEST(a_mistake_without_a_name_is_located)
     }
 }
 
-/* All images of one level, or one image for all: nothing but what that image shows rightly. */
+/* Hands in one grey level for all images (like -1), or image number `like` in the place of every other. */
 static struct submitted_images *hand_in_same(int like, uint8_t level)
 {
     static uint8_t rgb8[3 * 128 * 96];

@@ -117,8 +117,8 @@ TEST(two_bugs_have_both_names)
             fail_msg("%s and %s", known[i][0], known[i][1]);
 }
 
-/* Light that bounces find by themselves adds to what is left of direct light; a wider view shows another part of a floor, so that
- * more than noise is left. Controls: neither of that, nor near. */
+/* Emission found by bounces adds to the remaining direct light; a wider view shows other parts of the floor, so that
+ * more than noise remains unexplained. Controls: effects further apart than either model allows. */
 TEST(two_bugs_that_do_not_multiply_have_both_names)
 {
     static const char *const adds[] = {"hemisphere_in_world_frame-direct", "emission_twice-mesh"},
@@ -130,7 +130,8 @@ TEST(two_bugs_that_do_not_multiply_have_both_names)
     assert_false(both_are_named(near[0], near[1], 3, &excess));
 }
 
-/* What shared random numbers did to the stored images is one throw, and no reason beside another bug. */
+/* The effect of shared random numbers stored in the catalogue is one random draw, so it must not be named beside
+ * another bug. */
 TEST(a_throw_is_not_one_of_two)
 {
     double excess;

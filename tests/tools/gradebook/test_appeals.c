@@ -1,4 +1,4 @@
-/* Points that staff decided, and what is told of a change. Sums are by hand. */
+/* Points set by staff, and how a change of grade is reported. Sums are by hand. */
 #include "tools/gradebook/appeals.h"
 #include "tools/gradebook/grade_change.h"
 
@@ -71,7 +71,7 @@ TEST(what_is_decided_counts)
     json_object_set_new(grade, "id", json_string("Ada Lovelace"));
     appeals_apply(&a, rubric, grade);
     assert_near(json_number_value(json_object_get(grade, "points")), 4.5, 1e-12);
-    /* The hash of what is decided tells one from another, and says nothing of who has none. */
+    /* The hash of the decisions differs between students who have some, and is constant for those without. */
     appeals_key(NULL, "bob", none);
     appeals_key(&a, "eve", key);
     assert_string_equal(key, none);

@@ -3,7 +3,7 @@
 
 #include "tests/support/test.h"
 
-/* A grade in which nothing is to be looked at, though points are lost. */
+/* A grade that needs no attention by staff, though points are lost. */
 static json_t *a_grade(void)
 {
     return json_pack("{sn, sn, ss, s[{ss, ss, sb, sf}], s[{ss}, {sn}]}", "trouble", "wrong",

@@ -128,11 +128,12 @@ TEST(noise_of_others)
     assert_true(least > bound && half > bound);
 }
 
-/* H0: 300 programs with noise of their own, right or 20 % too bright on one half: T above 2.33 in about 1 % (normal law), so at
- * most 12 of 300 (P < 1e-4), none above the bound of a class of 300 with 20 images (P < 1e-3). Then 20 of each: the
- * reference as it is, with the noise of 64 samples on top, 2 % brighter, half of it, and a render that was made longer: all but
- * the last have its noise. With a sixteenth of the noise that is added its T is about 6 in one image, so that about half are
- * found by themselves; five images together, as T over the root of 5 obeys the same bound, every time. */
+/* H0: 300 programs with noise of their own, correct or 20 % too bright on one half: T above 2.33 in about 1 %
+ * (normal law), so at most 12 of 300 (more have P < 1e-4), none above the bound of a class of 300 with 20 images (P
+ * < 1e-3). Power, 20 of each: the reference as it is, with the noise of 64 samples added, 2 % brighter, or half of
+ * it; all share its noise, unlike a longer render. Where the reference's variance is a sixteenth of the added one, T
+ * is about 6 in one image, so about half are found in one; with five images (the sum of T over sqrt 5 obeys the same
+ * bound) all are. */
 TEST(copies_of_the_reference)
 {
     enum { OWN, BRIGHT_HALF, COPY, WITH_NOISE, RETOUCHED, HALF_OF_IT, LONGER, KINDS };

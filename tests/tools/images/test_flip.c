@@ -289,7 +289,7 @@ static size_t clamped(int x, int y)
 
 enum { EDGE_X = 3, EDGE_Y, POINT_X, POINT_Y, NUM_FILTERS };
 
-/* A weight, not normalised. */
+/* The filter's weight at offset (x, y) in pixels, not normalised. */
 static double weight(const struct oracle *o, int filter, int x, int y)
 {
     double d2 = (x * x + y * y) / (o->at[PPD] * o->at[PPD]), s = o->at[W] / 2 * o->at[PPD];
@@ -403,7 +403,7 @@ TEST(test_brute_force)
     near(furthest(wanted, got), 0, AGREES, "exchanged");
 }
 
-/* Controls: each constant a little off is seen by that comparison. */
+/* Controls: a small change of any one constant is noticed by that comparison. */
 TEST(test_brute_force_sees)
 {
     static double a[3 * PIXELS], b[3 * PIXELS], wanted[PIXELS];

@@ -120,7 +120,7 @@ TEST(small_images)
     }
 }
 
-/* Variance that is not known (one observation) is none. */
+/* An unknown variance (one observation) is stored as no noise. */
 TEST(one_observation)
 {
     OWN(moments) m = blank(4, 4, "sample");
@@ -131,7 +131,8 @@ TEST(one_observation)
     assert_round_trip(&m);
 }
 
-/* Each root within half a step of 1/128, what is none of them at the end of the range, NaN at 0. */
+/* Each square root comes back to within half a step of 1/128; values out of range are clamped to its ends, NaN
+ * becomes 0. */
 TEST(map_round_trip)
 {
     enum { WIDTH = 37, HEIGHT = 11, PIXELS = WIDTH * HEIGHT };

@@ -164,9 +164,9 @@ static enum verdict compare_without_skewness(int n, double scale, int pixels, ui
     return c.verdict;
 }
 
-/* Of 15 pixels that vary nothing is told: |g| = 1/sqrt 15, far beyond 0.2 x 3/x^3 = 0.02, x about 3.3 at 5 % over four
- * tests, so 50 % more are not seen. All 1024 of n = 128 find 3 %: sd sqrt(2/131072) = 0.4 %. Equal: at most 9 of 60 (chance
- * 1e-3 at a true 5 %). */
+/* With 15 noisy pixels the skewness is unknown: |g| = 1/sqrt 15, far above 0.2 x 3/x^3 = 0.02 (x about 3.3 at 5 %
+ * over four tests), so 50 % more light is not found. With all 1024, n = 128, 3 % is: sd sqrt(2/131072) = 0.4 %. H0,
+ * equal means: at most 9 of 60 DIFFERENT (more have a probability of about 1e-3 at a true 5 %). */
 TEST(test_unknown_skewness)
 {
     uint64_t seed = 12;
@@ -297,8 +297,9 @@ TEST(test_rounded_floats)
     input_free(&in);
 }
 
-/* The display window is the image: what the file lacks of it is 0 and need not be opaque, what it has besides is
- * not looked at. Data 3 x 2 from (9, 21), shown 4 x 3 from (10, 20): its columns 1 and 2 lie in rows 1 and 2. */
+/* The display window is the image: pixels outside the data window are 0 and need not be opaque, data outside the
+ * display window is ignored. Data 3 x 2 from (9, 21), shown 4 x 3 from (10, 20): data columns 1 and 2 land in rows 1
+ * and 2. */
 TEST(test_cropped)
 {
     struct notes notes = {0};
@@ -351,9 +352,9 @@ TEST(test_hygiene)
     assert_refused(test_path("gone.exr"), none, "No such file");
 }
 
-/* 64 x 64 linear codes: A and B noise of a few codes about 100, but a square of 12 x 12 that A has at 255
- * and B at 30: a gross difference that must not be seen, and must not be called equal either. 144 of
- * 4096 pixels are 3.5 %, less than 5 %, but 56 % of the tile of 16 x 16 at 0,0. */
+/* 64 x 64 linear codes: noise of a few codes about 100 on both sides, but in a square of 12 x 12 A is
+ * saturated at 255 and B is 30: a gross difference that can be neither found nor called equal. 144 of 4096
+ * pixels are 3.5 %, less than 5 %, but 56 % of the tile of 16 x 16 at 0,0. */
 static void fill_codes(uint16_t *code, int side, uint64_t *state)
 {
     for (int i = 0; i < 3 * side * side; i++)
@@ -419,9 +420,9 @@ TEST(test_censored)
     assert_int_equal(compare_files(pa, pb, opt, &notes, &censored), VERDICT_DIFFERENT);
 }
 
-/* Half a code is allowed for: images of one code, and of the next, are equal within two halves; two
- * codes apart they are not. 100 -> 101 -> 102 of 255, margins of 0. Noise: one pixel in 16 one code up
- * in A, elsewhere in B. */
+/* Rounding of half a code a side is allowed for: images one code apart show no difference, two codes apart
+ * they do. Codes 100, 101, 102 of 255, margins of 0. Noise: one pixel in 16 is one code higher in A, other
+ * pixels in B. */
 TEST(test_rounding_is_no_difference)
 {
     static uint16_t a[3 * 64 * 64], b[3 * 64 * 64];

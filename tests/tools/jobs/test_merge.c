@@ -200,9 +200,9 @@ static void merge_files(const char *of, int to)
     share_free(&whole);
 }
 
-/* Groupings of the same four shares: 4, 5 .. are what the ones before made; the last of each is the whole. The values of a file
- * are compared bit by bit with those of all four at once. Shares of the same cell, of two cells with
- * the same ranges, and of two cells cut at other samples. */
+/* Groupings of the same four shares; numbers 4, 5, .. are the results of earlier merges, the last of each is the
+ * whole image. Its file is compared bit by bit with that of all four merged at once. The shares are of one cell, of
+ * two cells with the same sample ranges, and of two cells with different ones. */
 TEST(any_grouping_has_the_same_bits)
 {
     static const struct part cases[][MAX_SHARES] = {{{.layers = true, ALL, 0, 7},
@@ -244,7 +244,8 @@ TEST(any_grouping_has_the_same_bits)
     }
 }
 
-/* Without its parts a merge is merged further by its rounded sums: the bits differ, so the test above can fail. */
+/* Control for the test above: a merge stored without its parts is merged further from rounded sums, and the bits
+ * differ. */
 TEST(rounded_sums_have_other_bits)
 {
     struct share whole[2] = {{0}, {0}}, share[MAX_SHARES] = {0};

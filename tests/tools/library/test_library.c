@@ -264,8 +264,9 @@ TEST(test_refusals)
     assay_free(c);
 }
 
-/* Level: 40 pairs of equal law at alpha 0.01 (H0: equal): more than 4 DIFFERENT has a probability below 1e-4 under it. Power: 20 % more
- * light, whose standard error is 0.3 %, is found in all of five pairs. The same by permutation and by flips. */
+/* H0: equal laws, 40 pairs at alpha 0.01: more than 4 DIFFERENT have a probability below 1e-4. Power: 20 % more
+ * light, with a standard error of 0.3 %, is found in all of five pairs. The same for permutations and for sign
+ * flips. */
 TEST(test_verdicts)
 {
     static float a[K * VALUES], b[K * VALUES], bright[K * VALUES];

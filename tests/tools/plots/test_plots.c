@@ -1,5 +1,5 @@
-/* The curves of the page's plots against other routes: the QQ band against sums of binomial probabilities,
- * the power curve against simulated tests; and its CSV files, decoded again. */
+/* The curves of the page's plots, computed another way: the QQ band from sums of binomial probabilities,
+ * the power curve from simulated tests; and the page's CSV links, decoded again. */
 #include "tools/html/csv_link.h"
 #include "tools/html/html.h"
 #include "tools/plots/plot.h"
@@ -39,9 +39,9 @@ static json_t *claim_of(double alpha, double margin, double mdb)
     return c;
 }
 
-/* A test of level 0.05 x 0.25 / 4 (two-sided) of a mean with that standard error, 40000 times for each bias.
- * Frequencies lie within 4 standard errors, at most 0.01, of the curve with 0.9999 each. Control: the curve
- * of half the bias does not fit. */
+/* A two-sided test of a mean at level 0.05 x 0.25 / 4 with that standard error, simulated 40000 times for
+ * each bias. Each frequency lies within 4 standard errors (at most 0.01) of the curve with probability
+ * 0.9999. Control: the curve at half the bias does not fit. */
 TEST(power_is_that_of_the_test)
 {
     enum { TRIALS = 40000 };
@@ -113,7 +113,7 @@ TEST(text_is_escaped_and_numbers_are_printed)
                         "<b title=\"&quot;x&#39;\">&lt;i&gt;&amp;</b> -3 7 +1.50% 1099511627776");
 }
 
-/* Of a drawing: the places of marks, and the numbers of the axes, by hand. */
+/* Positions of the marks and labels of the axes, worked out by hand. */
 TEST(axes_are_in_proportion)
 {
     OWN_TEXT text = NULL;

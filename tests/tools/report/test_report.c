@@ -511,7 +511,7 @@ TEST(images_have_the_values)
     xmlFreeDoc(doc);
 }
 
-/* Evidence is folded where there is much of it and it is as expected. */
+/* With many claims the evidence of those that came out as expected is folded. */
 TEST(much_evidence_is_folded)
 {
     OWN(run) r = run_of_small_files();
@@ -670,8 +670,8 @@ static double lightness(double y)
     return 116 * cbrt(y) - 16;
 }
 
-/* Flat greys, of which FLIP is that of two lightnesses: here a reference of L* 50 (18.42 % of white) and white; for HDR
- * the reference at 0.85 of the tone curve and 1/0.1842 times its light. */
+/* Flat greys, whose FLIP depends on their two lightnesses alone: here a reference of L* 50 (18.42 % of white) against
+ * white; for HDR, a reference at 0.85 of the tone curve against 1/0.1842 times its light. */
 TEST(alike)
 {
     enum { SIDE = 12, PIXELS = SIDE * SIDE };

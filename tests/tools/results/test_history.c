@@ -84,7 +84,7 @@ TEST(a_move_is_found)
     assert_non_null(strstr(text, "20_&lt;i&gt;moves"));
 }
 
-/* What the last run does not have, and one run alone, moved nowhere. */
+/* A series that the last run lacks, or that has only one run, has not moved. */
 TEST(no_move_without_two_points)
 {
     write_run("two", "1/results.json", "2026-01-01T00:00:00Z",

@@ -1,4 +1,4 @@
-/* What sentences say of claims made by hand; amounts are the claim's difference, rounded by hand. */
+/* The sentences for claims made by hand; amounts are the claim's difference, rounded by hand. */
 #include "tools/results/plain_words.h"
 #include "tests/support/test.h"
 

@@ -86,9 +86,8 @@ TEST(round_trip)
     assert_string_equal(text + strlen(text) - 2, "}\n");
 }
 
-/* Every member that the header promises is missed by name when it is absent, and refused when it is
- * of another type. No member promised here is of type object-or-true, so `true` is wrong for all
- * but the two booleans, for which a string is. */
+/* Every member that the header promises is named in an error when it is absent or of another type.
+ * The wrong value is `true`, or a string for the two booleans. */
 static void set(json_t *claim, const char *name, const char *json)
 {
     json_error_t error;
@@ -238,8 +237,8 @@ TEST(bad_file)
     REFUSES(json_write("/proc/no/results.json", root, &e), "/proc/no");
 }
 
-/* NO DIFFERENCE FOUND has passed where no more could have been missed, of the image and of a tile, than was
- * accepted; the fixture's MDBs are 0.7 % and 9 %. */
+/* NO DIFFERENCE FOUND passes if the MDBs of the image and of a tile are at most the accepted ones; the fixture's are
+ * 0.7 % and 9 %. */
 TEST(accepted_mdb)
 {
     static const struct {

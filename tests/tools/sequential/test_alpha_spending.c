@@ -1,8 +1,8 @@
 /* The error rates of tools/sequential/alpha_spending.c, measured on synthetic renders whose truth is known. Seeds and
  * numbers of claims were fixed before the first run; nothing is retried. "Consistent with at most alpha":
  * the lower Clopper-Pearson bound of the observed rate at confidence 0.999 does not exceed alpha. With 2000
- * claims at 5 % it takes 134 wrong verdicts to fail: a true rate of 5 % fails with 9e-4, one of 8 % with
- * 0.98 (both binomial).
+ * claims at 5 % it takes 132 wrong verdicts to fail: a true rate of 5 % fails with 9.5e-4, one of 8 %
+ * with 0.99 (both binomial).
  *
  * A render is 8 x 8 pixels that add blocks of 16 samples, each a random one of POOL blocks of normal
  * samples of mean 1 and standard deviation 0.7. A and B draw from one pool, so H0 holds exactly for what
@@ -33,7 +33,7 @@ static int fill_pool(void **state)
     return 0;
 }
 
-/* One stream of a side: `m` has so many blocks already. */
+/* The samples of one side: `m` holds the first n blocks. */
 struct stream {
     struct moments m;
     int n;
@@ -90,7 +90,7 @@ static bool pair_of(void *ctx, int stage, const struct moments **a, const struct
     return true;
 }
 
-/* What a sequence said. Each counts once a claim. */
+/* Outcomes of sequences of looks, each counted at most once a claim. */
 struct tally {
     int claims;
     int different, equivalent;           /* the verdict: of the first look that decides */
@@ -209,10 +209,10 @@ TEST(test_false_equivalent)
     assert_true(lower_bound(naive.ever_equivalent, CLAIMS) > alpha);
 }
 
-/* What the looks buy, against one look at the declared samples. The margins (12 and 40 %) are wide enough
- * that the declared size passes equal renderers in most cases, as those of the suite are. The sequence
- * decides equal ones with less than the declared samples on average, far off ones at its first look, those
- * near the margin with more samples where the single look stays undecided. */
+/* The saving of several looks over one look at the declared samples. As in the suite, the margins (12 and
+ * 40 %) are wide enough for equal renderers to pass at the declared size in most cases. The sequence decides
+ * equal renderers with fewer samples on average, grossly different ones at its first look, and those near
+ * the margin with more samples, where the single look stays undecided. */
 TEST(test_saving)
 {
     enum { RUNS = 500 };
@@ -240,9 +240,9 @@ TEST(test_saving)
 }
 
 /* H0: equal means; two stages, one look, alpha = 1 %, so 10 % a stage. DIFFERENT at most 1 %. Negative
- * controls: stage 1 by itself, at 10 %, breaks 1 %; and so do two stages that share their reference, as
- * a golden would, where that is what the noise is of (16 samples against 512): this is why validate
- * holds such a claim to one stage. */
+ * controls: stage 1 by itself, at 10 %, exceeds 1 %; so do two stages that share a reference, as with a
+ * golden, when most of the noise is the reference's (16 samples against 512). This is why validate judges
+ * such a claim in one stage. */
 TEST(test_two_stages)
 {
     const double product = 0.01;
@@ -282,8 +282,8 @@ TEST(test_two_stages)
     assert_true(lower_bound(shared, CLAIMS) > product);
 }
 
-/* Both together, at an alpha of which no tail could be measured: a wrong renderer is found, an equal one
- * passes. And a stage that is not fresh is refused. */
+/* Two stages at each of several looks, at an alpha too small for its rate to be measured: a wrong renderer is
+ * found, an equal one passes. A second stage that repeats the seeds of the first is refused. */
 TEST(test_two_stages_in_sequence)
 {
     enum { RUNS = 100 };

@@ -27,7 +27,7 @@ static void free_world(struct world *w)
     moments_free(&w->b2);
 }
 
-/* Both stages; first_only: the second stage looks at the first pair again, as nobody may. */
+/* Runs both stages. first_only: the second stage judges the first pair again, the mistake to be shown. */
 static enum verdict run(const struct world *w, const struct compare_options *opt, bool first_only,
                         bool *flagged, char *reason)
 {
@@ -84,9 +84,9 @@ TEST(test_confirmed)
     free_world(&w);
 }
 
-/* n 256: with fewer, the skewness of regions smaller than the image is not known well enough.
- * One quarter in stage 1, another in stage 2: the place that was flagged must be the place. (What has no
- * place, the dense statistic, may confirm that there is something.) */
+/* One quarter brighter in stage 1, the same or another in stage 2: only the flagged place can be confirmed.
+ * (The dense statistic, which has no place, may confirm that there is something.) n = 256: with fewer
+ * samples the skewness of regions smaller than the image is not known well enough. */
 TEST(test_same_place)
 {
     struct world w = new_world();
@@ -109,10 +109,10 @@ TEST(test_same_place)
     free_world(&w);
 }
 
-/* H0: equal laws. alpha 4 %: each stage 20 %. 1000 worlds: DIFFERENT at most 4 %, more than 66 has a
- * chance of 1e-4 at that rate. Negative control: a second stage on the first pair confirms what it
- * saw. It confirms at the level divided by the flagged alone, so nearly always; the share of flagged
- * worlds is what the first stage may have, and must lie beyond the 66 for the control to say anything. */
+/* H0: equal laws. alpha 4 %, so 20 % in each stage. 1000 worlds: DIFFERENT in at most 4 %; more than 66
+ * have a probability of 4e-5 at that rate. Negative control: a second stage on the first pair again
+ * confirms what it saw, nearly always, as its level is divided among the flagged places alone. It means
+ * something only if the worlds flagged by the first stage are more than 66. */
 TEST(test_false_alarms)
 {
     struct world w = new_world();

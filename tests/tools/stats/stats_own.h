@@ -1,4 +1,5 @@
-/* What the tests of convergence and of variances share. Freed where their block ends: RNG, REFERENCE. */
+/* Shared by the tests of convergence and of variances. RNG and REFERENCE declare variables freed at the end of their
+ * block. */
 #ifndef ASSAY_TESTS_STATS_OWN_H
 #define ASSAY_TESTS_STATS_OWN_H
 

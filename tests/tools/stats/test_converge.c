@@ -1,6 +1,6 @@
-/* Statistics of convergence: formulas against brute force, error rates on synthetic engines whose bias,
- * slope and variance are known, and negative controls that must be flagged. Seeds and counts were fixed
- * beforehand; nothing is drawn again. */
+/* Statistics of convergence: formulas against brute force; error rates on synthetic engines of known bias,
+ * slope and variance; negative controls that must be flagged. Seeds and counts were fixed beforehand;
+ * nothing is retried. */
 #include "stats_own.h"
 #include "tools/results/convergence_results.h"
 #include "tools/results/results_matrix.h"
@@ -18,7 +18,7 @@
 enum { WIDTH = 12, HEIGHT = 12, SIZE = 3 * WIDTH * HEIGHT, K = 16, RUNGS = 5 };
 static const double ladder[RUNGS] = {1, 4, 16, 64, 256};
 
-/* The mean of n samples of mean 1, by laws whose sums have a closed form. */
+/* Laws of a sample of mean 1 for which the mean of n samples can be drawn directly. */
 enum law {
     EXPONENTIAL, /* Gamma(n)/n */
     BLACK,       /* 90 % are 0, the rest exponential of mean 10 */
@@ -49,7 +49,7 @@ static double truth(size_t i)
 static void render(gsl_rng *rng, const struct engine *g, double n, int count, float *images)
 {
     double effective = pow(n, g->exponent);
-    /* Laws of whole numbers of samples are scaled where the exponent asks for another variance. */
+    /* The laws take whole numbers of samples, so another exponent scales their noise instead of n. */
     double factor = g->scale * sqrt(n / effective);
     for (int k = 0; k < count; k++) {
         double common = g->law == SHARED ? draw_mean(rng, EXPONENTIAL, n) - 1 : 0;
@@ -102,8 +102,8 @@ static void climb(gsl_rng *rng, const struct engine *g, const struct converge_re
     free(images);
 }
 
-/* H0: a wrong answer has at most the probability alpha. Rejected where `wrong` or more of n would have a
- * probability below 1e-4 then. */
+/* H0: the probability of a wrong answer is at most alpha. Fails if `wrong` or more of n have a
+ * probability below 1e-4 under it. */
 static void assert_rate(const char *what, int wrong, int n, double alpha)
 {
     printf("%s: %d of %d wrong, %.2f %% for %.2g %%\n", what, wrong, n, 100.0 * wrong / n,
@@ -112,8 +112,8 @@ static void assert_rate(const char *what, int wrong, int n, double alpha)
         fail_msg("%s: %d of %d wrong at alpha %g", what, wrong, n, alpha);
 }
 
-/* Every estimate by its definition in the header, pair by pair, and its jackknife by taking each replicate
- * away in earnest. */
+/* Every estimate by its definition in the header, pair by pair, and its jackknife by really leaving out
+ * each replicate. */
 TEST(estimates_are_their_definitions)
 {
     enum { COUNT = 5 };
@@ -189,7 +189,7 @@ TEST(slope_is_least_squares)
     gsl_fit_wlinear(x, 1, w, 1, y, 1, RUNGS, &c0, &c1, &cov[0], &cov[1], &cov[2], &chi2);
     struct estimate slope = convergence_rate_slope(rung, RUNGS);
     assert_near(slope.value, c1, 1e-12);
-    /* A slope is linear in the y: its variance from what it moves by when each y moves. */
+    /* The slope is linear in the y, so its variance follows from its change as each y changes by 1. */
     double var = 0;
     for (int i = 0; i < RUNGS; i++) {
         double moved, before = y[i];
@@ -258,9 +258,9 @@ TEST(a_smaller_reference_is_a_box_average)
     REFUSES(convergence_rate_reference_init(&r, &m, 1, &e), "black");
 }
 
-/* H0: the interval of the slope misses -1/2 in alpha of all runs, of an unbiased engine of independent
- * samples. 2000 runs a law at 5 % and 0.1 %; a rate of 7.0 % (0.5 %) or more is rejected with 99.99 %,
- * so a true rate of 8 % (0.8 %) is found with more than 90 %. */
+/* H0: for an unbiased engine with independent samples the interval of the slope misses -1/2 in alpha of
+ * all runs. 2000 runs a law at 5 % and 0.1 %; an observed rate of 7.0 % (0.5 %) or more is rejected at
+ * 1e-4, so a true rate of 8 % (0.8 %) is found with 96 %. */
 TEST(slope_interval_covers)
 {
     static const char *const name[] = {"exponential", "90 % black", "shared noise"};
@@ -287,8 +287,8 @@ TEST(slope_interval_covers)
     }
 }
 
-/* Negative controls for the slope, 200 runs each at alpha 1e-3: all must be DIFFERENT. A detection rate
- * below 97.7 % would let one slip with 99 %. */
+/* Negative controls for the slope, 200 runs each at alpha 1e-3: all must be DIFFERENT. At a detection rate
+ * below 97.7 % at least one would be missed with probability 99 %. */
 TEST(wrong_slopes_are_found)
 {
     static const struct {
@@ -315,7 +315,7 @@ TEST(wrong_slopes_are_found)
     }
 }
 
-/* A right slope with few, wild replicates is not called right. */
+/* A right slope from few, very noisy replicates is INCONCLUSIVE, unless the margin is wide. */
 TEST(a_vague_slope_is_inconclusive)
 {
     struct rung rung[RUNGS] = {0};
@@ -328,12 +328,13 @@ TEST(a_vague_slope_is_inconclusive)
     assert_int_equal(convergence_rate_slope_verdict(slope, 1e-3, 10), VERDICT_EQUIVALENT);
 }
 
-/* Bias just at the margin of 3 %: DIFFERENT and EQUIVALENT are both wrong, each in at most alpha of all
- * runs; 2000 runs at 5 %. No bias: never DIFFERENT, EQUIVALENT in most; 9 %: always DIFFERENT. */
+/* H0: a bias of exactly the margin, 3 %, where DIFFERENT and EQUIVALENT are both wrong: each in at most
+ * alpha = 5 % of 2000 runs a law (10 % with shared noise). Controls: without bias never DIFFERENT and
+ * EQUIVALENT in more than 90 %; with 9 % always DIFFERENT. */
 TEST(floor_keeps_its_error_rates)
 {
     enum { RUNS = 2000 };
-    /* So that each law has a variance of 1 a sample. */
+    /* Gives each law a variance of 1 per sample: 1, 1/sqrt 19, sqrt 2. */
     static const double scale[] = {1, 0.2294157, 1.4142136};
     for (int law = EXPONENTIAL; law <= SHARED; law++) {
         RNG *rng = new_rng(300 + (unsigned long)law);
@@ -368,8 +369,8 @@ TEST(floor_keeps_its_error_rates)
     }
 }
 
-/* A biased engine has the right slope on a short ladder and only the floor tells. 200 runs, alpha 1e-3,
- * margin 1 %, bias 5 % at 256 samples of relative noise 1/4: all DIFFERENT. */
+/* On a short ladder a biased engine has nearly the right slope; only the floor shows the bias. 200 runs, alpha
+ * 1e-3, margin 1 %, bias 5 %, 256 samples of relative variance 1/4 (sd 1/2) each: all DIFFERENT. */
 TEST(a_floor_under_a_good_slope_is_found)
 {
     const struct engine g = {EXPONENTIAL, 0.05, 1, 0.5};
@@ -384,16 +385,17 @@ TEST(a_floor_under_a_good_slope_is_found)
     assert_int_equal(found, 200);
 }
 
-/* H0: the interval of the variance ratio misses the true one in alpha of all runs. 2000 runs a law, 5 %.
- * The ratio is 1.3^2; 16 and 24 replicates. Control: 1 is outside in nearly all. */
+/* H0: the 95 % interval misses the true variance ratio, 1.3^2 times that of the laws, in alpha = 5 % of
+ * 2000 runs a law (10 % with shared noise); 16 and 24 replicates. Control: it excludes 1 in more than 95 %,
+ * but for shared noise, whose ratio is 0.85. */
 TEST(variance_ratio_covers)
 {
     enum { RUNS = 2000, MORE = 24 };
     for (int law = EXPONENTIAL; law <= SHARED; law++) {
         RNG *rng = new_rng(500 + (unsigned long)law);
         const struct engine a = {(enum law)law, 0, 1, 1.3}, b = {EXPONENTIAL, 0, 1, 1};
-        /* Of a sum of halves, one of them shared: (1/4 + 1/4) of the variance; 90 % black: E x^2 is 0.1 x
-         * 200, less 1. */
+        /* Half own plus half shared noise: 1/4 + 1/4 of the variance. 90 % black: E x^2 - 1 = 0.1 x 200 - 1
+         * = 19. */
         double of_law = law == SHARED ? 0.5 : law == BLACK ? 19 : 1;
         REFERENCE ref = make_reference(rng, &b, 1, 0);
         static float images[MORE * SIZE];
@@ -506,8 +508,8 @@ static double xpath_number(xmlXPathContext *context, const char *expression)
     return v;
 }
 
-/* The page is read again by libxml2: every rung a dot in both plots, at the place that its numbers ask
- * for; text that is not ours is escaped; a second file can be joined, but only if it has anything. */
+/* The page is read back by libxml2: every rung is a dot in both plots, at the position of its numbers;
+ * foreign text is escaped; a second file that has a 'convergence' too, or a file with nothing, is refused. */
 TEST(the_page_shows_the_rungs)
 {
     const char *results = test_path("results.json"), *page = test_path("index.html");
@@ -534,8 +536,8 @@ TEST(the_page_shows_the_rungs)
         snprintf(xpath, sizeof xpath, "count(//%s)", counts[i].what);
         assert_near(xpath_number(c, xpath), counts[i].number, 0);
     }
-    /* RMSE falls to a half where samples grow fourfold: on the line of slope -1/2, which begins in the
-     * first dot and ends at the right edge. */
+    /* RMSE halves as samples quadruple, so both dots lie on the guide of slope -1/2, which runs from the
+     * first dot to the right edge. */
     double x0 = xpath_number(c, "(//*[@class='dot'][*])[1]/@cx");
     double y0 = xpath_number(c, "(//*[@class='dot'][*])[1]/@cy");
     double x1 = xpath_number(c, "(//*[@class='dot'][*])[2]/@cx");
@@ -560,8 +562,8 @@ TEST(the_page_shows_the_rungs)
     json_decref(root);
 }
 
-/* Everything that the table or the page would read and that is missing or of another kind is a line that
- * names it. */
+/* Any member that the table or the page reads and that is missing or of the wrong type gives an error line
+ * that names it. */
 TEST(broken_results_are_refused)
 {
     static const struct {

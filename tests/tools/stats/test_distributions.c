@@ -40,7 +40,7 @@ TEST(test_p_closed_forms)
 }
 
 /* GSL's cdf switches to a truncated expansion for nu > 30, so the reference here is its incomplete
- * beta function, which is not. */
+ * beta function, which does not. */
 TEST(test_p_gsl_beta)
 {
     const double dof[] = {0.7, 1.5, 3, 7.25, 15, 30.5, 100, 1000, 20000};
@@ -75,9 +75,8 @@ TEST(test_p_power_tail)
     assert_true(stats_t_log10_p(1e9, 3000) < -20000);
 }
 
-/* Normal limit: log erfc from GSL. At nu = 1e11 the two differ by t^4/(4 nu) in ln p (from
- * expanding
- * -(nu+1)/2 ln(1 + t^2/nu)): 2.5e-6 relative to 5000 at t = 100. */
+/* Normal limit: log erfc from GSL. At nu = 1e11 ln p differs by t^4/(4 nu) (expand
+ * -(nu+1)/2 ln(1 + t^2/nu)): at t = 100 by 2.5e-4 of 5000, a relative 5e-8. */
 TEST(test_p_normal_limit)
 {
     for (double t = 0.1; t < 100; t *= 1.5) {
@@ -89,8 +88,8 @@ TEST(test_p_normal_limit)
     assert_close(stats_t_log10_p(0, 5), 0, 0);
 }
 
-/* The two methods that meet at nu = 1e6, where the step in nu moves ln p by t^4/(4 nu) 2e-9 only.
- */
+/* The two methods meet at nu = 1e6, where the relative step of 2e-9 in nu moves ln p by only
+ * 2e-9 t^4/(4 nu). */
 TEST(test_p_methods_meet)
 {
     for (double t = 1; t < 1000; t *= 1.5)
@@ -138,7 +137,7 @@ TEST(test_quantile_gsl)
     assert_close(stats_normal_quantile(0.9), -1.2815515655446004, 1e-12);
 }
 
-/* Wallace's approximation: its z has the p of t to 3 % in z, and the inverse is one. */
+/* Wallace's approximation: z has the p of t to within 3 % of z, and stats_t_of_z() inverts it. */
 TEST(test_normal_equivalent)
 {
     for (double nu = 3; nu < 1e6; nu *= 3)
@@ -183,7 +182,7 @@ TEST(test_hill)
     assert_true(stats_hill_z(3, INFINITY) == 3);
 }
 
-/* The first by hand: va = 4/10, vb = 9/5 of n = 10 and 5: V = 2.2, nu = 4.84 / (.16/9 + 3.24/4) = 5.84690... */
+/* The first by hand: va = 4/10, vb = 9/5 of n = 10 and 5: V = 2.2, nu = 4.84 / (.16/9 + 3.24/4) = 5.84698... */
 TEST(test_dof)
 {
     assert_close(stats_welch_dof(0.4, 10, 1.8, 5), 4.84 / (0.16 / 9 + 3.24 / 4), 1e-14);

@@ -1,5 +1,5 @@
-/* tools/stats/noise_estimate.c: two images without moments. Closed forms of what the kernel sees; error rates of
- * the comparison that is built on it, with noise of a pixel's own and noise that neighbours share. */
+/* tools/stats/noise_estimate.c: two images without moments. Closed forms of the variance that the kernel sees; error
+ * rates of the comparison built on it, with independent pixels and with noise shared by neighbours. */
 #include "tests/support/simulate.h"
 
 #include "tools/compare/compare.h"
@@ -18,8 +18,9 @@ static double normal(uint64_t *state)
 enum noise { OWN, SHARED, SMOOTHED, SKEWED };
 static const double noise_sd = 0.1;
 
-/* An image of mean `scale` by a smooth shade, with noise of sd 0.1 of a pixel's own, or sums of 2 x 2 (smoothed: 7 x 7)
- * independent ones over 2 (7) (sd 0.1 again, shared by neighbours), or exponential; R, G, B alike. */
+/* An image of mean `scale` times a smooth shade with noise of sd 0.1: independent normal (OWN); sums of 2 x 2
+ * (SHARED) or 7 x 7 (SMOOTHED) normal numbers over 2 or 7, shared by neighbours; or exponential (SKEWED). R, G, B
+ * alike. */
 static void paint(struct moments *m, enum noise kind, double scale, uint64_t *state)
 {
     int w = m->width, h = m->height,
@@ -61,10 +62,10 @@ static void assert_between(double got, double lo, double hi)
         fail_msg("got %.9g, want %.9g to %.9g", got, lo, hi);
 }
 
-/* 256 x 256, independent: Var(sum D) = 2 sd^2 N; its estimate has a relative sd of sqrt(2 x 3.78/N) =
- * 1.1 % times a bound that is at least the factor, 1 +- 4.3 % (4096 means, 3.78 correlated), times what
- * makes 99.9 % of it: 1 to 1.35. Degrees of freedom: N/6, +- 10 % for what r^4 scatters. The skewness
- * is 0 +- 6.1/256 = 0.024 (test of four of these). */
+/* 256 x 256 independent pixels: Var(sum D) = 2 sd^2 N. Its estimate has a relative sd of sqrt(2 x 3.78/N)
+ * = 1.1 %, times an upper bound of the factor, which is 1 +- 4.3 % (4096 block means, sqrt(2 x 3.78/4096)),
+ * times the allowance for 99.9 %: 1 to 1.35 in all. Degrees of freedom N/6, +- 10 % for the scatter of
+ * r^4. Skewness 0 with sd 6.1/256 = 0.024, tested at 4 of these. */
 TEST(test_independent)
 {
     OWN(moments) a = new_moments(256, 256, "sample"), b = new_moments(256, 256, "sample");
@@ -84,9 +85,9 @@ TEST(test_independent)
     assert_string_equal(a.unit, "picture");
 }
 
-/* Shared by k x k, k = 2 and 7: the sum's variance is k^2 times that of independent pixels of the same sd (each own
- * number enters k^2 pixels at a kth of its size), up to the rim: 3 % at 7. What is found must not be less; of
- * 7 x 7, whose level is asked of means of 8 x 8 and guessed beyond, it is at most 2.5 times as much. */
+/* Noise shared by k x k pixels, k = 2 and 7: Var(sum) is k^2 times that of independent pixels of the same sd (each
+ * normal number enters k^2 pixels with weight 1/k), less 3 % at the rim for k = 7. The estimate must not be below;
+ * for 7 x 7, measured on means of 8 x 8 and extrapolated beyond, it is at most 2.5 times as large. */
 TEST(test_shared)
 {
     static const struct {
@@ -110,7 +111,7 @@ TEST(test_shared)
     }
 }
 
-/* A - B = f(x) + g(y), steps and all: nothing the kernel sees, so no noise. */
+/* A - B = f(x) + g(y), even with steps, lies in the kernel's null space: no noise is found. */
 TEST(test_blind_to_sums)
 {
     OWN(moments) a = new_moments(32, 32, "sample"), b = new_moments(32, 32, "sample");
@@ -150,8 +151,8 @@ TEST(test_refused)
     moments_free(&b);
 }
 
-/* How many of `runs` pairs come out DIFFERENT; pixels independent by decree: the variance that the
- * kernel sees, without what neighbours share. */
+/* How many of `runs` pairs come out DIFFERENT. decree: pixels are declared independent, that is, the
+ * variance is divided by the factor for what neighbours share. */
 static int count_different(enum noise kind, double scale, double alpha, int runs, bool decree,
                            uint64_t seed)
 {
@@ -178,10 +179,8 @@ static int count_different(enum noise kind, double scale, double alpha, int runs
     return different;
 }
 
-/* H0: the same mean. alpha 5 %, 400 pairs a law: more than 36 (9 %) would have a chance of 1e-4 at a
- * true rate of 5 %. Negative control: without the factor for what neighbours share, it is exceeded. */
-/* Images that are the same but in a square, as of a program without seeds that has changed in one thing: whatever the
- * square's size, there is a finite variance or a line. */
+/* Images that are equal outside a square, as of a program without seeds in which one thing has changed: whatever the
+ * square's size, the result is a finite variance or an error line. */
 TEST(test_same_but_in_a_square)
 {
     const int width = 96, height = 64, at = 12; /* within a block */
@@ -212,6 +211,8 @@ TEST(test_same_but_in_a_square)
     assert_true(refused > 0 && refused < height - at);
 }
 
+/* H0: the same mean. alpha 5 %, 400 pairs a law: more than 36 (9 %) have a probability of 3e-4 at a
+ * true rate of 5 %. Negative control: without the factor for what neighbours share the rate is exceeded. */
 TEST(test_false_alarms)
 {
     int most = 36;
@@ -228,8 +229,8 @@ TEST(test_false_alarms)
     assert_true(control > 40);
 }
 
-/* Power: sd of the relative difference of the image is 0.1 sqrt(2)/64 = 0.22 %; 3 % are found in all of
- * 50 pairs, at alpha 1e-3. */
+/* Power: the image's relative difference has an sd of 0.1 sqrt(2)/64 = 0.22 %; a bias of 3 % is found in
+ * all of 50 pairs at alpha 1e-3. */
 TEST(test_power)
 {
     assert_int_equal(count_different(OWN, 1.03, 1e-3, 50, false, 31), 50);

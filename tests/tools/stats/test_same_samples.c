@@ -1,4 +1,5 @@
-/* The same samples added up in other ways, as floats store them; and what a wrong sum would look like. */
+/* The same samples summed whole and in two shares, rounded to the floats of a file; and faulty sums, which must be
+ * found. */
 #include "renderer/math/sampler.h"
 #include "tools/stats/same_samples.h"
 #include "tests/support/own.h"
@@ -6,7 +7,7 @@
 
 enum { WIDTH = 5, HEIGHT = 3, N = 40, CUT = 13 };
 
-/* Means of 1000 and a noise of 1e-3 of that are the worst for sums of squares; blue has no noise. */
+/* Green, a mean of 1000 with noise of 1e-3 of it, is the worst case for sums of squares; blue has no noise. */
 static void add_samples(struct moments *m, uint32_t first, uint32_t last)
 {
     for (size_t p = 0; p < WIDTH * HEIGHT; p++)
@@ -92,7 +93,7 @@ TEST(sums_of_shares)
     assert_string_equal(reason, "n of pixel (4, 2) is 67, not 40");
 }
 
-/* Where pixels have other numbers of samples only those are looked at that have so many. */
+/* Where sample counts differ between pixels, only the pixels with the given count are compared. */
 TEST(pixels_of_one_count)
 {
     struct moments whole = share(0, CUT), some = share(0, N), less = share(0, CUT);
@@ -108,7 +109,7 @@ TEST(pixels_of_one_count)
     }
     assert_int_equal(same_samples_differing(&whole, &some, CUT, reason), 0);
     assert_int_equal(same_samples_differing(&whole, &some, 0, reason), WIDTH * HEIGHT / 2);
-    some.n[1] = CUT; /* says so, and has more */
+    some.n[1] = CUT; /* claims that count, but holds the sums of N samples */
     assert_int_equal(same_samples_differing(&whole, &some, CUT, reason), 1);
     struct moments narrow = moments_run(&less, 0, 3);
     assert_true(same_samples_differing(&whole, &narrow, 0, reason) > 0);

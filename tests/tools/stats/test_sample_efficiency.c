@@ -1,5 +1,5 @@
-/* Noise by closed form against simulation, and what is judged by it: renders that waste samples, adaptive
- * sampling that stops at the wrong place. Seeds and numbers of trials are fixed; nothing is retried. */
+/* The closed-form variance of a sample against simulation, and the checks built on it: renders that waste
+ * samples, adaptive sampling that stops too early or too late. Seeds and trials are fixed; nothing is retried. */
 #include "reference/truth/truth_lamps.h"
 #include "reference/truth/truth_noise.h"
 #include "renderer/math/sampler.h"
@@ -21,7 +21,7 @@ static double weight(enum estimator how, double a, double b)
     return how == ONE_TECHNIQUE ? 1 : how == BALANCE ? a / (a + b) : a * a / (a * a + b * b);
 }
 
-/* One sample at (x, 0, z) under the lamp, by random numbers and vectors. */
+/* Radiance estimate of one sample at (x, 0, z) below the lamp, by its own route: random points and directions. */
 static double simulate(const struct truth_lamp *l, double x, double z, enum estimator how,
                        uint32_t stream, uint32_t i)
 {
@@ -54,7 +54,7 @@ static const struct {
     {{0.5, {-0.5, 1.1}, {-0.7, 0.5}}, 0.3, 0.1},
 };
 
-/* The first moment is the irradiance over pi, known otherwise: to 1e-8, at order 48. */
+/* The first moment is the irradiance over pi, known in closed form: to 1e-8 relative, quadrature order 48. */
 TEST(first_moment_is_the_mean)
 {
     for (size_t i = 0; i < COUNT(places); i++) {
@@ -67,9 +67,9 @@ TEST(first_moment_is_the_mean)
     }
 }
 
-/* H0: simulated samples have the second moment of the form. z of N = 4e5 samples, below 4.4 with
- * probability 1 - 1e-5 for each of the three places. Other estimators of the same mean must be further
- * off at the place where the two techniques are equally good, by more than 10. */
+/* H0: simulated samples have the second moment of the closed form. n = 4e5 samples at each of three
+ * places: |z| < 4.4 with probability 1 - 1e-5. Control: other estimators of the same mean have
+ * |z| > 10 at the place where the two techniques are equally good. */
 TEST(second_moment_is_that_of_samples)
 {
     enum { SAMPLES = 400000 };
@@ -95,7 +95,7 @@ TEST(second_moment_is_that_of_samples)
 
 enum { SIDE = 8, PIXELS = SIDE * SIDE, RENDERS = 8 };
 
-/* Exponential samples of mean 1, the same in all channels; of those asked for, one in `every` is taken. */
+/* Exponential samples of mean 1, the same in all channels; takes only asked/every samples a pixel. */
 static struct moments render(int k, int asked, int every)
 {
     struct moments m;
@@ -125,8 +125,8 @@ static struct sample_efficiency judge(int every, double margin)
     return f;
 }
 
-/* A sample variance of 64 x 256 exponential ones is known to sqrt(8/16384) = 2.2 % a render, so the
- * interval is about +-0.8 % x t(7, 5e-5) = 6 %. */
+/* The sample variance of 64 x 256 exponential samples has a relative sd of sqrt(8/16384) = 2.2 % in
+ * one render, 0.8 % over 8, so the interval is about +-0.8 % x t(7, 5e-5) = 6 %. */
 TEST(wasted_samples_are_found)
 {
     struct sample_efficiency f = judge(1, 0.2);
@@ -146,8 +146,8 @@ TEST(wasted_samples_are_found)
         moments_free(&none[k]);
 }
 
-/* Adaptive sampling of exponential samples of mean 3 p: the rule as the assignment has it, and the ways
- * in which it was seen to go wrong. */
+/* Adaptive sampling of exponential samples, mean 3 p in pixel p: the assignment's stopping rule, and the
+ * mistakes seen in implementations of it. */
 enum rule { AS_ASKED, ONE_SIGMA, ABSOLUTE, WITHOUT_ROOT, NEVER, NO_BATCH };
 
 static bool holds(enum rule rule, double s1, double s2, double n, double tolerance)

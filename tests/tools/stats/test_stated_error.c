@@ -1,5 +1,5 @@
-/* tools/stats/stated_error.c on renders whose law is known: exponential samples, which are as skewed as direct
- * light, of 16 x 16 pixels, n = 32 a pixel, K = 8 renders. Seeds are fixed; nothing is retried. */
+/* tools/stats/stated_error.c on renders whose law is known: exponential samples, as skewed as direct light,
+ * 16 x 16 pixels, n = 32 a pixel, K = 8 renders. Seeds are fixed; nothing is retried. */
 #include "renderer/math/sampler.h"
 #include "tools/stats/stated_error.h"
 #include "tools/results/stated_error_results.h"
@@ -10,10 +10,10 @@
 
 enum { SIDE = 16, PIXELS = SIDE * SIDE, SAMPLES = 32, RENDERS = 8 };
 
-/* What a renderer may do wrong without its mean being off. */
+/* What a renderer may do wrong without a bias of its mean. */
 enum fault { RIGHT, SAMPLES_REPEAT, PIXELS_SHARE, STRATIFIED, SEED_IGNORED, VARIANCE_HALVED };
 
-/* A uniform number: position in the sequence `sample` of `pixel` of render `seed`, by the fault. */
+/* The uniform number of dimension c of that sample, pixel and render (seed), drawn with the fault. */
 static double uniform(enum fault fault, uint64_t seed, uint32_t pixel, uint32_t sample, uint32_t c)
 {
     if (fault == SAMPLES_REPEAT)
@@ -57,10 +57,9 @@ static struct stated_error judge(enum fault fault, uint64_t trial, double margin
     return c;
 }
 
-/* H0: independent samples. A DIFFERENT is wrong; alpha = 5 %, of which two thirds go to pixels and
- * image at the most. n = 200 trials: more than 22 have the probability 1e-4 if the rate is 5 %. The
- * margin of 50 % is far from R = 1, so only the image's test is at work in `wrong`; R itself must
- * lie in its 95 % interval in all but 22 of the trials too. */
+/* H0: independent samples, so DIFFERENT is wrong; alpha = 5 %. n = 200 trials: more than 22 have a
+ * probability of 2e-4 at a rate of 5 %. The margin of 50 % is far from R = 1, so `wrong` comes from the
+ * image's test alone; the 95 % interval of R may miss 1 in at most 22 trials too. */
 TEST(independent_samples_pass)
 {
     int wrong = 0, outside = 0;
@@ -74,14 +73,14 @@ TEST(independent_samples_pass)
     assert_true(gsl_cdf_binomial_Q(21, 0.05, 200) < 1e-3);
     assert_true(wrong <= 22);
     assert_true(outside <= 22);
-    /* R's own spread: sqrt(2 (1 + kurtosis 6/32 / 2) / (7 x 512)) = 2.5 % for 512 independent
-     * values, / sqrt 200. */
+    /* The sd of R: sqrt(2 (1 + (6/32)/2) / (7 x 512)) = 2.5 % for 512 independent values of excess
+     * kurtosis 6/32; of the mean over the trials 1/sqrt 200 of that. */
     assert_true(fabs(sum - 1) < 5 * 0.025 / sqrt(200));
 }
 
-/* R of the faults, from what they do: half the samples are copies: the mean's variance is twice what
- * M2 states, but for the spread of pairs, (n-1)/(n-2) less. Halved M2: 2. Shared numbers: R = 1, and
- * S = the number of pixels. Stratified -ln u: V(mean) << V/n. */
+/* R of each fault. Every sample twice: the mean has variance 2 s^2/n, and E[M2] = (n-2) s^2, so
+ * R = 2 (n-1)/(n-2). Halved M2: R = 2. Random numbers shared by all pixels: R = 1, S = the number of
+ * pixels. Stratified -ln u: Var(mean) << s^2/n, R << 1. */
 TEST(faults_are_found)
 {
     struct stated_error c = judge(SAMPLES_REPEAT, 301, 0.1, 1e-3);
@@ -137,7 +136,7 @@ static const char record[] =
     "\"seconds\": 2},"
     " {\"scene\": \"41\", \"engine\": \"pathtracer\", \"passed\": false, \"error\": \"no <file>\"}]";
 
-/* Edits of the record above and a part of the line that must come out; NULL: it is fine. */
+/* Edits of the record above, and a part of the error line that each must give; NULL: accepted. */
 TEST(records_are_checked)
 {
     static const char *const cases[][3] = {
@@ -170,7 +169,7 @@ TEST(records_are_checked)
     }
 }
 
-/* What is printed and what is in the page; markup in names stays text. */
+/* The printed table and the page; markup in names is escaped. */
 TEST(records_are_shown)
 {
     json_auto_t *c = json_loads(record, 0, NULL);

@@ -1,4 +1,4 @@
-/* tools/stats/third_moment.c: bounds against third moments that are known, and verdicts without them. */
+/* tools/stats/third_moment.c: bounds against known third moments, and verdicts where only the bound is known. */
 #include "tests/support/simulate.h"
 #include "tests/support/own.h"
 #include "tests/support/test.h"
@@ -29,11 +29,11 @@ static void sum_up(const struct moments *a, const struct moments *b, double *k3,
     }
 }
 
-/* Exponential samples, 48 x 48 pixels, n = 64. Against the exact mean: k3 = 2/n^2 is 2/sqrt n = 0.25 of v^1.5, and sums
- * of v^1.5 are more than E[v]^1.5, by 1 + 3/8 x 8/n = 1.05: 0.24. The standard error of a window is 2/17 of sd(v)/v =
- * sqrt(8/64) and of its kurtosis, 0.04 to 0.1. Against another of its kind k3A - k3B = 0. Against 1024 samples it is
- * 0.25 (1 - 1/256)/(1 + 1/16)^1.5 = 0.23. Each is held to between the truth less 15 %, 4 standard errors of 9 windows, and
- * the truth plus 0.15. */
+/* Exponential samples, 48 x 48 pixels, n = 64. Against the exact mean: k3 = 2/n^2 is 2/sqrt n = 0.25 of v^1.5; as
+ * E[v^1.5] exceeds E[v]^1.5 by a factor of 1 + 3/8 x 8/n = 1.05, the ratio of sums is 0.24. The standard error of a
+ * window is 2/17 of sd(v)/v = sqrt(8/64) and of its kurtosis, 0.04 to 0.1. Against another such image k3A - k3B = 0.
+ * Against 1024 samples it is 0.25 (1 - 1/256)/(1 + 1/16)^1.5 = 0.23, less the same few per cent 0.22. The bound has
+ * to lie between the truth less 15 % (4 standard errors of 9 windows) and the truth plus 0.15. */
 TEST(test_bound_meets_the_truth)
 {
     uint64_t seed = 31;
@@ -58,8 +58,8 @@ TEST(test_bound_meets_the_truth)
     }
 }
 
-/* With fewer than 16 pixels that vary nothing is told: V^1.5, whatever the sides look like. 16 x 16, 15 of n = 100,
- * vA = 1/99, vB = 3/99: k3A - k3B = (4/99)^1.5, and k3A^2/vA + k3B^2/vB = V^2. */
+/* With fewer than 16 noisy pixels nothing can be estimated: the bound is V^1.5, whatever the sides look like. Here
+ * 15 of 16 x 16, n = 100, vA = 1/99, vB = 3/99: k3A - k3B = (4/99)^1.5, and k3A^2/vA + k3B^2/vB = V^2. */
 TEST(test_too_few_pixels)
 {
     OWN(moments) a = new_moments(16, 16, "sample"), b = new_moments(16, 16, "sample");
@@ -76,7 +76,7 @@ TEST(test_too_few_pixels)
     assert_true(a.m3[0] == 0 && b.m3[0] == 0);
 }
 
-/* Verdicts of equal images of a law, 16 x 16, tiles of 8, with M3 bounded or said to be 0. */
+/* Number of DIFFERENT among pairs of equal means, 16 x 16, tiles of 8, with M3 bounded or set to 0. */
 static int count_different(enum law law, int n_a, int n_b, int pairs, bool is_bounded,
                            uint64_t seed)
 {
@@ -97,9 +97,10 @@ static int count_different(enum law law, int n_a, int n_b, int pairs, bool is_bo
     return different;
 }
 
-/* H0: equal. alpha 1 %, 100 pairs a law: 8 or more of a true 1 % have a chance of 1e-5. Control: 90 % black, 64 samples
- * against 1024, with M3 = 0: a pixel of A has a skewness of 6.5/sqrt 64 = 0.8 and 0.9^64 = 0.1 % of them are black, of
- * variance 0, when the others lie 14 standard errors off. */
+/* H0: equal means. alpha 1 %, 100 pairs a law: 8 or more have a probability of 1e-5 at a true rate of 1 %. Control:
+ * 90 % black, 64 samples against 1024, with M3 = 0: a pixel's mean in A has a skewness of 6.5/sqrt 64 = 0.8, and
+ * 0.9^64 = 0.1 % of A's pixels are black with variance 0, so that B's mean lies 1/sqrt(19/1024) = 7 standard errors
+ * off. */
 TEST(test_level_without_third_moments)
 {
     assert_true(count_different(LAW_BLACK, 64, 1024, 100, true, 41) < 8);
@@ -108,9 +109,10 @@ TEST(test_level_without_third_moments)
     assert_true(count_different(LAW_BLACK, 64, 1024, 100, false, 41) >= 8);
 }
 
-/* Dark pixels that few samples reach, 500 of 0.1 % and 0.5 else, n = 4096, tiles of 16 of 32 x 32: sd 15.8, so 1.1 % of
- * the image and 2.2 % of a tile: EQUIVALENT at 8 and 20 %. As a log-normal law its skewness would be 4000 and that of the
- * image 1.4: no number of samples were enough. */
+/* Dark pixels that few bright samples reach: 0.5, and 500 more in 0.1 % of the samples (mean 1, sd 15.8), n = 4096,
+ * 32 x 32, tiles of 16. The difference has a standard error of 1.1 % (image) and 2.2 % (tile): EQUIVALENT at 8 and
+ * 20 %. Bounded as a log-normal law a sample's skewness would be 4000 and the image's 1.4: no number of samples
+ * would be enough. */
 TEST(test_dark_pixels)
 {
     OWN(moments) a = new_moments(32, 32, "sample"), b = new_moments(32, 32, "sample");

@@ -1,5 +1,5 @@
-/* Variances of areas with their intervals: against brute force, then error rates on noise whose law is known, and
- * negative controls that must be found. Seeds and counts were fixed beforehand; nothing is drawn again. */
+/* Variances of image regions with their intervals: against brute force; error rates on noise whose law is known;
+ * negative controls that must be found. Seeds and counts were fixed beforehand; nothing is retried. */
 #include "stats_own.h"
 #include "tools/stats/variance_ladder.h"
 #include "tests/support/own.h"
@@ -8,7 +8,7 @@
 #include <gsl/gsl_cdf.h>
 #include <gsl/gsl_randist.h>
 
-/* 3 x 2 tiles of 8: the last column, 5 wide, is one of its own, the last row, 3 high, is not. */
+/* 3 x 2 tiles of 8: the remainder of 5 columns is a tile of its own, that of 3 rows joins the tile above. */
 enum { WIDTH = 21, HEIGHT = 19, TILE = 8, SIZE = 3 * WIDTH * HEIGHT, K = 8, SPP = 16 };
 
 enum law { EXPONENTIAL, BLACK /* 90 % are 0, the rest exponential of mean 10 */ };
@@ -43,7 +43,7 @@ static struct converge_reference make_unit(void)
     return r;
 }
 
-/* One render of SPP samples; scale: of the samples. Channels are the same, the worst case for the interval. */
+/* One render of SPP samples, each multiplied by scale. All channels are equal, the worst case for the interval. */
 static void render(gsl_rng *rng, enum law law, double scale, struct moments *m)
 {
     struct err e;
@@ -76,7 +76,7 @@ static void renders_free(struct renders *r)
         moments_free(&r->m[k]);
 }
 
-/* The definitions of the header, with the pixel's variance by leaving out each replicate in earnest. */
+/* The header's definitions, with the jackknife computed by really leaving out each replicate. */
 TEST(estimates_are_their_definitions)
 {
     RNG *rng = new_rng(1);
@@ -129,9 +129,10 @@ TEST(estimates_are_their_definitions)
     renders_free(&r);
 }
 
-/* H0: at most alpha of the claims about a variance at its margin are DIFFERENT, and at most alpha of those EQUIVALENT.
- * 600 runs against 600 records at alpha 5 %, rejected where so many or more have a probability below 1e-4; power: a rate of
- * 10 % is found with more than 95 %. The law of 90 % black has few lit samples in each interval: the hard case. */
+/* H0: of claims whose variance lies exactly at the margin at most alpha come out DIFFERENT, and at most alpha
+ * EQUIVALENT. 600 runs against 600 records at alpha 5 %; rejected where a count of this size or more has a
+ * probability below 1e-4, from 53 on. Power: a rate of 11 % is rejected with 96 %. The hard case is 90 % black: few
+ * samples in each interval are lit. */
 static void check_rates(enum law law, unsigned long seed)
 {
     enum { RUNS = 600 };
@@ -184,8 +185,9 @@ TEST(rates_of_mostly_black_noise)
     check_rates(BLACK, 3);
 }
 
-/* H0: of independent samples the interval of the slope misses -1/2 in at most alpha of 600 ladders, the degrees of freedom
- * those of validate. Control: noise that falls with slope -0.45 is missed by the interval in more than half of them. */
+/* H0: with independent samples the interval of the slope misses -1/2 in at most alpha of 600 ladders; degrees of
+ * freedom as in validate. Control: where noise falls with slope -0.45 the interval excludes -1/2 in more than half
+ * of them. */
 TEST(slopes_of_mostly_black_noise)
 {
     enum { RUNS = 600, RUNGS = 4 };
@@ -222,7 +224,7 @@ TEST(slopes_of_mostly_black_noise)
     assert_true(wrong[1] > RUNS / 2);
 }
 
-/* 3.1 times the variance is DIFFERENT at alpha 1e-6, a third of it is EQUIVALENT, but for a claim of two sides. */
+/* 3.1 times the variance is DIFFERENT at alpha 1e-6; 1/3.1 of it is EQUIVALENT, unless the claim is two-sided. */
 TEST(more_noise_is_found_and_less_is_not_an_error)
 {
     RNG *rng = new_rng(4);
@@ -248,7 +250,7 @@ TEST(more_noise_is_found_and_less_is_not_an_error)
         variance_map_free(&map[i]);
 }
 
-/* What was without noise has to stay so; what had noise and has none is no increase. */
+/* What was free of noise must stay so; noise that has gone is no increase, so DIFFERENT only if two-sided. */
 TEST(no_noise_is_asserted)
 {
     const struct estimate none = {0, 0, 1}, rounding = {1e-12, 1e-13, 10}, some = {1e-2, 1e-4, 100};
@@ -261,7 +263,7 @@ TEST(no_noise_is_asserted)
     assert_int_equal(variance_ladder_judge(none, some, 0.1, true, 1e-6).verdict, VERDICT_DIFFERENT);
 }
 
-/* Of mostly black noise, whose skewness is 6.5: the sign of M3 turned, and half of M3. */
+/* Mostly black noise, skewness 6.5, with the sign of M3 flipped, and with M3 halved. */
 TEST(third_moments_that_cannot_be_are_an_error)
 {
     RNG *rng = new_rng(7);
@@ -277,7 +279,7 @@ TEST(third_moments_that_cannot_be_are_an_error)
         r.m[3].m3[i] *= -0.5;
     REFUSES(variance_ladder_within(r.m, K, &unit, TILE, &map, &e), "no samples of radiance have");
     renders_free(&r);
-    /* One sample of 1e-21 among 64 of nothing: its cube is 0 in a file's 32-bit floats, where its square still is something. */
+    /* One sample of 1e-21, the rest 0: its cube underflows to 0 in a file's 32-bit floats, its square does not. */
     render_all(rng, BLACK, 1, &r);
     for (int k = 0; k < K; k++) {
         double n = r.m[k].n[0], x = 1e-21;
@@ -289,7 +291,7 @@ TEST(third_moments_that_cannot_be_are_an_error)
     renders_free(&r);
 }
 
-/* Replicates of which two are the same, with others that are not. */
+/* Two of the replicates are the same image, the others are not. */
 TEST(a_seed_without_effect_is_an_error)
 {
     RNG *rng = new_rng(5);

@@ -324,7 +324,8 @@ static double centre(const struct primitive *p, int axis)
     return (p->low[axis] + p->high[axis]) / 2;
 }
 
-/* Splitting at the mean of the centres on the longest axis, as most write it first, ends in leaves of 4. */
+/* Does splitting at the mean of the centroids on the longest axis, the usual first BVH, end in leaves of at most
+ * LEAF? */
 static bool splits(struct primitive *p, int num)
 {
     struct primitive box = p[0];

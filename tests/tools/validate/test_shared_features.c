@@ -1,4 +1,4 @@
-/* What claims that differ are told to have in common: which scenes have a feature is read off their files' text. */
+/* The features that differing claims are said to share; the expected ones are found by searching the scene files. */
 #include "tests/support/suite_files.h"
 #include "tests/support/test.h"
 #include "tools/results/results.h"
@@ -82,7 +82,7 @@ static bool has_sky_image(const struct suite_scene *s)
     return s->environment[0] != '\0';
 }
 
-/* Neither does it alone. */
+/* A mistake that needs both features: neither alone shows it. */
 static bool has_mirror_and_spheres(const struct suite_scene *s)
 {
     return has_mirror(s) && file_has(s->dae, "<sphere>");
@@ -132,7 +132,7 @@ TEST(what_the_claims_that_differ_share_is_told)
     }
 }
 
-/* Controls: nothing is told of what has nothing in common, or if nothing differs. */
+/* Controls: no feature is named where the differing claims share none, or where nothing differs. */
 TEST(what_they_do_not_share_is_not)
 {
     char text[1024];
