@@ -170,7 +170,7 @@ END
 printf '#!/bin/sh\ncd "%s" && for task in *; do [ ! -e "$task" ] || echo "$task $(cat "$task")"; done\n' "$tmp/queue" >"$tmp/slurm/squeue"
 printf '#!/bin/sh\nrm -f "%s/$2 "*\n' "$tmp/queue" >"$tmp/slurm/scancel"
 chmod +x "$tmp/slurm"/* "$tmp/run"
-slurm() { (PATH=$tmp/slurm:$PATH exec timeout 60 "$assay" slurm "$@"); }
+slurm() { (PATH=$tmp/slurm:$PATH exec timeout --foreground 60 "$assay" slurm "$@"); }
 said() { "$@" 2>"$tmp/said" || { local status=$?; tail -n 1 "$tmp/said" >&2; return $status; }; } # its last line alone
 render=(pathtracer -q -t 1 -r 32 32 -s 16)
 "$pathtracer" "${render[@]:1}" -f "$tmp/here.exr" -f "$tmp/here.png" "$scene" >"$tmp/out"
@@ -183,7 +183,7 @@ CHANGE=$tmp/other.dae LOST="" expect "slurm: a job that cannot be made is tried 
     said slurm --plan "$tmp/changed" --parts 1 "${render[@]}" -f "$tmp/z.exr" "$tmp/other.dae"
 HOLD=1 slurm --plan "$tmp/stop" --parts 2 "${render[@]}" -f "$tmp/z.exr" "$scene" >"$tmp/out" 2>"$tmp/err" &
 follower=$!
-for ((i = 0; i < 100; i++)); do grep -q "2 waiting" "$tmp/err" && break || sleep 0.1; done
+for ((i = 0; i < 300; i++)); do grep -q "2 waiting" "$tmp/err" && break || sleep 0.1; done
 pkill -TERM -P $follower timeout
 wait $follower
 right "slurm: one that is stopped cancels its jobs" test "$?:$(ls "$tmp/queue")" = 3:
