@@ -174,12 +174,11 @@ slurm() { (PATH=$tmp/slurm:$PATH exec timeout --foreground 60 "$assay" slurm "$@
 said() { "$@" 2>"$tmp/said" || { local status=$?; tail -n 1 "$tmp/said" >&2; return $status; }; } # its last line alone
 render=(pathtracer -q -t 1 -r 32 32 -s 16)
 "$pathtracer" "${render[@]:1}" -f "$tmp/here.exr" -f "$tmp/here.png" "$scene" >"$tmp/out"
-export LOST=2
-expect "slurm: a lost task is run again" 0 "4 of 4 jobs made.*some submitted again" slurm --plan "$tmp/plan" --parts 4 "${render[@]}" -f "$tmp/there.exr" -f "$tmp/there.png" "$scene"
+LOST=2 expect "slurm: a lost task is run again" 0 "4 of 4 jobs made.*some submitted again" slurm --plan "$tmp/plan" --parts 4 "${render[@]}" -f "$tmp/there.exr" -f "$tmp/there.png" "$scene"
 right "slurm: the image is the one made here" cmp "$tmp/here.png" "$tmp/there.png"
 right "slurm: nothing else is run twice" test "$(cat "$tmp"/plan/log/assay-*.txt | grep -c begins)" = 4
 cp "$scene" "$tmp/other.dae"
-CHANGE=$tmp/other.dae LOST="" expect "slurm: a job that cannot be made is tried three times" 3 "job 0 came back 3 times without its artefact: .*other.dae" \
+CHANGE=$tmp/other.dae expect "slurm: a job that cannot be made is tried three times" 3 "job 0 came back 3 times without its artefact: .*other.dae" \
     said slurm --plan "$tmp/changed" --parts 1 "${render[@]}" -f "$tmp/z.exr" "$tmp/other.dae"
 HOLD=1 slurm --plan "$tmp/stop" --parts 2 "${render[@]}" -f "$tmp/z.exr" "$scene" >"$tmp/out" 2>"$tmp/err" &
 follower=$!

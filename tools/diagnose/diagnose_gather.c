@@ -90,7 +90,7 @@ static const char *subject_of(const json_t *results)
     static const char *const known[] = {ENGINES_WITH_GOLDENS(ENGINE_WORD) "truth"};
     json_each(claim, json_object_get(results, "claims")) {
         const char *a = member_text(claim, "a");
-        bool is_known = strcspn(a, "-") == strlen(ours) && strncmp(a, ours, strlen(ours)) == 0;
+        bool is_known = results_is_variant_of(a, ours);
         for (size_t k = 0; k < sizeof known / sizeof *known; k++)
             is_known |= strcmp(a, known[k]) == 0;
         if (!is_known)

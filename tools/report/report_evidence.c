@@ -32,8 +32,7 @@ static __attribute__((format(printf, 3, 4))) void write_fact(FILE *f, const char
 
 static void write_numbers(FILE *f, const json_t *claim)
 {
-    /* Two stages: the interval is of half of it. */
-    double alpha = member_number(claim, "alpha") / fmax(1, member_number(claim, "stages"));
+    double alpha = results_interval_alpha(claim);
     char image[32], tile[32];
     write_fact(f, "Difference of the image mean", "%s, %.6g\u00a0%% interval %s to %s",
                html_percent_prose(member_number(claim, "difference")).s, 100 * (1 - 2 * alpha),

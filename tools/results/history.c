@@ -75,8 +75,7 @@ static struct history_point point_of(const json_t *claim, size_t run)
 {
     struct history_point p = {
         .run = run,
-        /* Two stages: the interval is of half of it. */
-        .alpha = member_number(claim, "alpha") / fmax(1, member_number(claim, "stages")),
+        .alpha = results_interval_alpha(claim),
         .difference = member_number(claim, "difference"),
         .low = member_end(claim, "ci", 0),
         .high = member_end(claim, "ci", 1),

@@ -105,13 +105,6 @@ struct plain_words plain_words_claim(const json_t *claim)
     return w;
 }
 
-/* "pathtracer-light", a variant of "pathtracer". */
-static bool is_variant_of(const char *text, const char *name)
-{
-    const size_t n = strlen(name);
-    return strncmp(text, name, n) == 0 && (text[n] == '\0' || text[n] == '-');
-}
-
 /* The distinct values of a key, variants left out: "a, b and c"; beyond six "and other NOUN". */
 static struct plain_words names(const json_t *claims, const char *key, const char *noun)
 {
@@ -121,7 +114,7 @@ static struct plain_words names(const json_t *claims, const char *key, const cha
     for (size_t i = 0; i < json_array_size(claims); i++) {
         const char *text = member_or_empty(json_array_get(claims, i), key);
         size_t k = 0;
-        while (k < num && !is_variant_of(text, name[k]))
+        while (k < num && !results_is_variant_of(text, name[k]))
             k++;
         if (k == num && num < MOST_NAMES)
             name[num++] = text;

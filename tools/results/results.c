@@ -84,6 +84,17 @@ enum outcome results_row_outcome(const json_t *row)
     return verdict == VERDICT_DIFFERENT ? OUTCOME_OPPOSITE : OUTCOME_UNDECIDED;
 }
 
+double results_interval_alpha(const json_t *claim)
+{
+    return member_number(claim, "alpha") / fmax(1, member_number(claim, "stages"));
+}
+
+bool results_is_variant_of(const char *text, const char *name)
+{
+    const size_t n = strlen(name);
+    return strncmp(text, name, n) == 0 && (text[n] == '\0' || text[n] == '-');
+}
+
 size_t results_num_with_error(const json_t *claims, size_t i)
 {
     const json_t *error = json_object_get(json_array_get(claims, i), "error");

@@ -30,6 +30,10 @@ enum outcome results_claim_outcome(const json_t *claim);
 /* The same for a row of stated errors or noise, or an engine of "convergence". One that was only measured is as
  * expected. */
 enum outcome results_row_outcome(const json_t *row);
+/* The alpha of the claim's intervals, whose level is 1 - 2 alpha: half of the claim's where it has two stages. */
+double results_interval_alpha(const json_t *claim);
+/* Is "pathtracer-light", say, `name` itself or one of its variants? */
+bool results_is_variant_of(const char *text, const char *name);
 /* How many claims have the same error as claim i, which has one; 0 if an earlier claim has it (each is listed once). */
 size_t results_num_with_error(const json_t *claims, size_t i);
 /* Is claim (or row of noise) i the first of its scene? */

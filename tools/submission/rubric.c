@@ -21,7 +21,7 @@ struct statement {
     struct rubric_image *image; /* the block that the line stands in; at most one is not NULL */
     struct rubric_check *check;
     bool varies; /* a statement with {variant} was read */
-    /* Numbers and images given so far, a bit for each row of the table: of the rubric, of the block. */
+    /* Statements given so far, a bit for each row of the table: of the rubric, of the block. */
     uint32_t given[2];
 };
 
@@ -39,8 +39,6 @@ static void take_text(struct statement *s, const char *what, char *out, size_t s
 {
     if (s->rest[0] == '\0')
         rubric_mistake(s->m, s->line, "'%s' needs a text", what);
-    else if (out[0] != '\0')
-        rubric_mistake(s->m, s->line, "a second '%s'", what);
     else if (strlen(s->rest) >= size)
         rubric_mistake(s->m, s->line, "'%s' is longer than %zu characters", what, size - 1);
     else
@@ -161,16 +159,12 @@ static void read_budget(struct statement *s)
 
 static void read_mask(struct statement *s)
 {
-    if (s->r->mask[2] > 0)
-        rubric_mistake(s->m, s->line, "a second 'mask'");
     for (int i = 0; i < 4; i++)
         take_int(s, "mask", i < 2 ? 0 : 1, 4096, &s->r->mask[i]);
 }
 
 static void read_bugs(struct statement *s)
 {
-    if (s->r->bugs[0] != '\0')
-        rubric_mistake(s->m, s->line, "a second 'bugs'");
     take_name(s, "bugs", s->r->bugs, sizeof s->r->bugs);
 }
 
@@ -272,8 +266,6 @@ static void read_check(struct statement *s)
 
 static void read_size(struct statement *s)
 {
-    if (s->image->width > 0)
-        rubric_mistake(s->m, s->line, "a second 'size'");
     take_int(s, "size", 16, 4096, &s->image->width);
     take_int(s, "size", 16, 4096, &s->image->height);
 }
@@ -282,8 +274,6 @@ static void read_reference(struct statement *s)
 {
     struct rubric_image *p = s->image;
     char *kind = take_word(s);
-    if (p->reference != REFERENCE_NONE)
-        rubric_mistake(s->m, s->line, "a second 'reference'");
     for (int k = REFERENCE_TRUTH; k <= REFERENCE_OURS; k++)
         if (strcmp(kind, rubric_reference_names[k]) == 0)
             p->reference = (enum rubric_reference)k;
@@ -323,8 +313,6 @@ static void read_accept(struct statement *s)
 static void read_variants(struct statement *s)
 {
     struct rubric *r = s->r;
-    if (r->variants > 0)
-        rubric_mistake(s->m, s->line, "a second 'variants'");
     take_int(s, "variants", 2, 99, &r->variants);
     if (r->variant > r->variants)
         rubric_mistake(s->m, s->line, "there is no variant %d", r->variant);
@@ -359,6 +347,7 @@ struct member {
     size_t at, size;
     int lo, hi; /* of numbers */
     void (*read)(struct statement *s);
+    bool many; /* may be given again */
 };
 #define TO(type, name) .at = offsetof(struct type, name), .size = sizeof((struct type *)NULL)->name
 
@@ -369,15 +358,15 @@ static const struct member of_rubric[] = {{"rubric", TEXT, TO(rubric, title)},
                                           {"bugs", .read = read_bugs},
                                           {"output", TEXT, TO(rubric, output)},
                                           {"program", TEXT, TO(rubric, program)},
-                                          {"build", .read = read_build},
+                                          {"build", .read = read_build, .many = true},
                                           {"packages", TEXT, TO(rubric, packages)},
                                           {"total", NUMBER, TO(rubric, total), 0, 1000000},
-                                          {"limit", .read = read_limit},
-                                          {"budget", .read = read_budget},
+                                          {"limit", .read = read_limit, .many = true},
+                                          {"budget", .read = read_budget, .many = true},
                                           {"mask", .read = read_mask},
-                                          {"picture", .read = read_picture},
-                                          {"part", .read = read_part},
-                                          {"check", .read = read_check},
+                                          {"picture", .read = read_picture, .many = true},
+                                          {"part", .read = read_part, .many = true},
+                                          {"check", .read = read_check, .many = true},
                                           {0}};
 static const struct member of_image[] = {{"scene", TEXT, TO(rubric_image, scene)},
                                          {"size", .read = read_size},
@@ -387,7 +376,7 @@ static const struct member of_image[] = {{"scene", TEXT, TO(rubric_image, scene)
                                          {"options", TEXT, TO(rubric_image, options)},
                                          {"environment", TEXT, TO(rubric_image, environment)},
                                          {"reference", .read = read_reference},
-                                         {"accept", .read = read_accept},
+                                         {"accept", .read = read_accept, .many = true},
                                          {0}};
 static const struct member of_check[] = {{"image", MARGIN, TO(rubric_check, image)},
                                          {"tile", MARGIN, TO(rubric_check, tile)},
@@ -412,7 +401,7 @@ static bool read_member(struct statement *s, const struct member *m, void *objec
     if (object == NULL || m->word == NULL)
         return false;
     void *to = (char *)object + m->at;
-    if (m->read == NULL && m->value != TEXT && *given & row)
+    if (!m->many && *given & row)
         rubric_mistake(s->m, s->line, "a second '%s'", word);
     *given |= row;
     if (m->read != NULL)

@@ -192,8 +192,15 @@ static json_t *all_claims(const json_t *results)
     return all;
 }
 
-/* The program with most claims that wrongly differ, *length characters: "pathtracer" of "pathtracer-adaptive". */
-static const char *accused(const json_t *claims, size_t *length)
+/* Is one the program of the other, as "pathtracer" of "pathtracer-adaptive"? */
+static bool same_program(const char *a, const char *b)
+{
+    const size_t n = strcspn(a, "-");
+    return strcspn(b, "-") == n && strncmp(a, b, n) == 0;
+}
+
+/* The program with most claims that wrongly differ, or a variant of it; "": none. */
+static const char *accused(const json_t *claims)
 {
     const char *best = "";
     int most = 0;
@@ -201,17 +208,14 @@ static const char *accused(const json_t *claims, size_t *length)
         const char *a = member_text(c, "a");
         if (a == NULL)
             continue;
-        size_t n = strcspn(a, "-");
         int num = 0;
         json_each(other, claims) {
             const char *b = member_text(other, "a");
-            num += b != NULL && is_wrongly_different(other) && strcspn(b, "-") == n &&
-                   strncmp(a, b, n) == 0;
+            num += b != NULL && is_wrongly_different(other) && same_program(a, b);
         }
         if (num > most) {
             most = num;
             best = a;
-            *length = n;
         }
     }
     return best;
@@ -221,15 +225,14 @@ static bool collect(const struct suite *suite, struct traits *t, struct err *e)
 {
     const struct suite_scene *last = NULL;
     uint64_t bits = 0;
-    size_t length = 0;
-    const char *program = accused(t->json, &length);
+    const char *program = accused(t->json);
     json_each(c, t->json) {
         const struct suite_scene *s = suite_find(suite, member_text(c, "scene"));
         const char *a = member_text(c, "a");
         bool differs = is_verdict(c, "verdict", VERDICT_DIFFERENT);
         if (s == NULL || a == NULL || !is_verdict(c, "expected", VERDICT_EQUIVALENT) ||
             (!differs && !is_verdict(c, "verdict", VERDICT_EQUIVALENT)) ||
-            strcspn(a, "-") != length || strncmp(a, program, length) != 0)
+            !same_program(a, program))
             continue;
         if (s != last && !scene_traits(s, &bits, e))
             return false;
