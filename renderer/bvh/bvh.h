@@ -21,6 +21,13 @@ struct bvh_stats {
     uint64_t rays, box_tests, primitive_tests;
 };
 
+static inline void bvh_stats_add(struct bvh_stats *sum, const struct bvh_stats *more)
+{
+    sum->rays += more->rays;
+    sum->box_tests += more->box_tests;
+    sum->primitive_tests += more->primitive_tests;
+}
+
 struct bvh; /* opaque; refers to the scene, which must outlive it */
 
 /* NULL on failure (out of memory). */

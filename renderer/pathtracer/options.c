@@ -14,6 +14,7 @@
 
 static const char *const fresnel_names[] = {"exact", "schlick", NULL};
 static const char *const frame_names[] = {"crop", "whole", NULL};
+static const char *const off_on[] = {"off", "on", NULL};
 static const char *const dialect_names[] = {"auto", "collada", "cgl", NULL};
 
 enum { DEFAULT_SPP = 16, MAX_SPP = 1 << 24 };
@@ -227,6 +228,10 @@ static const struct cli_option options[] = {
      .read = read_seeds},
     {0, "sampler", "NAME", "independent, or sobol: less noise, no error estimate (independent)",
      TO(sampler), .names = sampler_kind_names},
+    {0, "guiding", "on|off",
+     "learn from a pilot render where indirect light comes from, and\n"
+     "trace more paths there: less noise; unbiased (off)",
+     TO(guiding), .names = off_on},
     {0, "integrator", "NAME", "path, or normals: the shading normals as colours (path)", TO(kind),
      .names = integrator_kind_names},
     {0, "accel", "NAME", "ray acceleration: bruteforce, centroid, sah or wide (wide)", TO(accel),
@@ -285,10 +290,11 @@ static bool complete(struct options *s, struct err *e)
                        s->cell[1], s->cell[2], s->cell[3], s->width, s->height);
     if ((s->adaptive_batch > 0 || s->pilot_tolerance >= 0 || s->max_error > 0) &&
         s->sampler != SAMPLER_INDEPENDENT)
-        return err_set(e,
-                       "--adaptive, --adaptive-unbiased and --error estimate the error from samples that have to be "
-                       "independent: not with --sampler %s",
-                       sampler_kind_names[s->sampler]);
+        return err_set(
+            e,
+            "--adaptive, --adaptive-unbiased and --error estimate the error from samples that have to be "
+            "independent: not with --sampler %s",
+            sampler_kind_names[s->sampler]);
     if (s->adaptive_batch > 0 && s->pilot_tolerance >= 0)
         return err_set(e, "--adaptive and --adaptive-unbiased exclude each other");
     if (s->pilot_tolerance >= 0 && s->last > 0 && s->spp == 0)

@@ -18,7 +18,7 @@ struct options {
     const char *resume;  /* the image to go on with; NULL: from the start */
     int width, height;
     int cell[4]; /* x y dx dy, origin at the bottom left */
-    int dialect, accel, isa, kind, direct, fresnel, sampler, frame;
+    int dialect, accel, isa, kind, direct, fresnel, sampler, frame, guiding;
     unsigned starter; /* 1 << enum cs184_deviation (cs184_deviations.h) */
     int spp;          /* paths per pixel, in all shares; the most if adaptive */
     int first, last;  /* sample numbers first .. last-1 are this program's share */

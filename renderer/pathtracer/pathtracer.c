@@ -143,6 +143,7 @@ static struct render_options render_options_of(const struct options *o)
                                                   .roulette = o->roulette,
                                                   .survival = (float)o->survival,
                                                   .sampler = sampler,
+                                                  .guiding = o->guiding,
                                                   .isa = (enum isa)o->isa},
                                    .x = o->cell[0],
                                    .y = o->height - o->cell[1] - o->cell[3],

@@ -56,6 +56,8 @@ bool render_id_make(const struct options *o, const struct scene *s, struct rende
              o->first_bounce, o->light_samples, (int)o->roulette, o->survival,
              bvh_kind_names[o->accel], o->dialect, o->lens_radius, o->focal_distance, camera,
              environment, o->fresnel, sampler_kind_names[o->sampler]);
+    if (o->guiding)
+        add_setting(id, "; guiding on");
     if (o->starter != 0 || o->frame != FRAME_CROP)
         add_setting(id, "; starter %u; frame %d", o->starter, o->frame);
     if (images[0] != '\0')

@@ -51,6 +51,7 @@ struct integrator_options {
     enum roulette_kind roulette;
     float survival; /* ROULETTE_FIXED: 0 < survival <= 1 */
     struct sampler sampler;
+    bool guiding;    /* send bounces where a pilot found light (guide.h) */
     bool first_hits; /* fill the batch's `first`; changes nothing else */
     enum isa
         isa; /* of the stages; ISA_SCALAR: one path at a time. Every choice gives the same bits */
@@ -69,6 +70,7 @@ struct integrator {
     const struct camera *camera;
     const struct bvh *bvh;
     const struct light_table *lights;
+    const struct guide *guide; /* NULL: none */
     /* The stages; and the scene for them, NULL: not needed. */
     const struct integrator_simd *stages;
     const struct scene_simd *records;
@@ -100,10 +102,11 @@ struct batch {
     float choice_probability[BATCH_ROOM], choice_weight[BATCH_ROOM];
     /* Paths that go on are kept side by side. slot: the lane of `pixel` and `radiance` to which a path belongs. */
     uint32_t slot[BATCH_ROOM], slot_pixel[BATCH_ROOM], slot_sample[BATCH_ROOM];
-    float numbers
-        [4][BATCH_ROOM]; /* random numbers, in rows of LANES paths for one purpose */
+    float numbers[4][BATCH_ROOM]; /* random numbers, in rows of LANES paths for one purpose */
     struct rgbs gathered, reflectance;
-    int32_t bits[BATCH_ROOM]; /* of the material's record */
+    float guided[BATCH_ROOM];  /* density of the numbers from which the next direction comes */
+    struct guide_notes *notes; /* NULL: not the pilot */
+    int32_t bits[BATCH_ROOM];  /* of the material's record */
     /* One element per LANES paths, a bit for each. */
     uint16_t goes_on[BATCH_ROOM], shadow_bits[BATCH_ROOM], shadow_first[BATCH_ROOM];
     struct bvh_stats stats;

@@ -1,5 +1,6 @@
 #include "render.h"
 
+#include "guide.h"
 #include "integrator_simd.h"
 
 #include <pthread.h>
@@ -110,9 +111,7 @@ static void *worker(void *arg)
             render_tile(j, b, tile_of(j, t));
     pthread_mutex_lock(&j->lock);
     if (b != NULL) {
-        j->stats.rays += b->stats.rays;
-        j->stats.box_tests += b->stats.box_tests;
-        j->stats.primitive_tests += b->stats.primitive_tests;
+        bvh_stats_add(&j->stats, &b->stats);
     }
     if (--j->running == 0)
         pthread_cond_signal(&j->ended);
@@ -282,8 +281,8 @@ static bool run_pilot(const struct integrator *it, const struct render_options *
     size_t pixels = (size_t)opt->width * (size_t)opt->height;
     bool ok = film_alloc(&pilot, opt->width, opt->height, false, e) && run_job(&j, &pw, end, e);
     w->asked = pw.asked;
-    stats->rays = j.stats;
-    stats->samples = (double)atomic_load(&j.samples_done);
+    bvh_stats_add(&stats->rays, &j.stats);
+    stats->samples += (double)atomic_load(&j.samples_done);
     if (ok && *end == RENDER_DONE) {
         film->target = calloc(pixels, sizeof *film->target);
         ok = film->target != NULL || err_set(e, "out of memory for the sample counts");
@@ -320,6 +319,7 @@ bool render_film(const struct scene *s, const struct camera *c, const struct bvh
         return false;
     }
     struct job j = {.it = &it, .opt = opt, .film = film};
+    struct guide *guide = NULL;
     double wall = progress_seconds(), cpu = cpu_seconds();
     double pixels = (double)opt->width * opt->height;
     struct watch w = {.control = control != NULL ? control : &uncontrolled,
@@ -329,7 +329,15 @@ bool render_film(const struct scene *s, const struct camera *c, const struct bvh
                       .total = pixels * (opt->num_samples - film->num_samples)};
     *stats = (struct render_stats){0};
     bool ok = true;
-    if (opt->pilot_samples > 0 && film->target == NULL)
+    if (it.opt.guiding && it.opt.kind == INTEGRATE_PATHS) {
+        it.guide = guide = guide_learn(&it, opt->threads, e);
+        ok = guide != NULL;
+        if (ok) {
+            stats->rays = guide->rays;
+            stats->samples = guide->paths;
+        }
+    }
+    if (ok && opt->pilot_samples > 0 && film->target == NULL)
         ok = run_pilot(&it, opt, &w, film, stats, &stats->end, e);
     if (film->target != NULL) {
         w.total = 0;
@@ -342,12 +350,11 @@ bool render_film(const struct scene *s, const struct camera *c, const struct bvh
     }
     if (ok && stats->end == RENDER_DONE)
         ok = run_job(&j, &w, &stats->end, e);
-    stats->rays.rays += j.stats.rays;
-    stats->rays.box_tests += j.stats.box_tests;
-    stats->rays.primitive_tests += j.stats.primitive_tests;
+    bvh_stats_add(&stats->rays, &j.stats);
     stats->samples += (double)atomic_load(&j.samples_done);
     stats->wall_seconds = progress_seconds() - wall;
     stats->cpu_seconds = cpu_seconds() - cpu;
+    guide_free(guide);
     integrator_free(&it);
     light_table_free(lights);
     return ok;

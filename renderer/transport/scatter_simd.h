@@ -3,6 +3,7 @@
 #ifndef ASSAY_SCATTER_SIMD_H
 #define ASSAY_SCATTER_SIMD_H
 
+#include "guide_simd.h"
 #include "paths_simd.h"
 #include "renderer/scene/shape_simd.h"
 
@@ -33,6 +34,45 @@ INLINE void finish(struct batch *b, int k, unsigned over)
     }
 }
 
+/* Notes bins for the paths of the mask. */
+static void guide_note(struct batch *b, int k, unsigned mask, vi bin, int vertex)
+{
+    for (; mask; mask &= mask - 1) {
+        const int i = k + __builtin_ctz(mask);
+        const uint32_t slot = b->slot[i];
+        const rgb gathered = rgbs_get(&b->gathered, i);
+        const rgb after = rgb_mul(rgbs_get(&b->throughput, i), rgbs_get(&b->reflectance, i));
+        b->notes->bin[vertex][slot] = LANE(bin, i - k);
+        b->notes->before[vertex][slot] = gathered.r + gathered.g + gathered.b;
+        b->notes->throughput[vertex][slot] = after.r + after.g + after.b;
+    }
+}
+
+/* Guides the numbers from which the paths' next directions come, where the surface is diffuse, and stores the
+ * densities; of others they are 1. */
+static __attribute__((noinline)) void guide(const struct integrator *it, struct batch *b, int n,
+                                            int vertex)
+{
+    for (int k = 0; k < n; k += LANES) {
+        unsigned mask = b->goes_on[k / LANES];
+        vi diffuse = lanes_of(mask) & has_bits(vi_load_any(b->bits + k), 1 << MATERIAL_DIFFUSE);
+        vf density = vf_set(1);
+        if (bits(diffuse)) {
+            /* Elsewhere there may be no surface. */
+            vec3v p = v3_select(diffuse, v3_load(&b->p, k), v3_all(it->guide->low));
+            vf old[2] = {vf_load_any(b->numbers[0] + k), vf_load_any(b->numbers[1] + k)};
+            vf new[2] = {old[0], old[1]};
+            vi bin, place = guide_place(it->guide, p, v3_load(&b->ns, k));
+            density = vf_select(diffuse, guide_direction(it->guide, place, new, &bin), density);
+            vf_store_any(b->numbers[0] + k, vf_select(diffuse, new[0], old[0]));
+            vf_store_any(b->numbers[1] + k, vf_select(diffuse, new[1], old[1]));
+            if (b->notes != NULL && vertex < GUIDE_VERTICES)
+                guide_note(b, k, bits(diffuse), place * GUIDE_BINS + bin, vertex);
+        }
+        vf_store_any(b->guided + k, density);
+    }
+}
+
 /* Sets up the next ray of every path that goes on and moves these paths to the front; returns how many. only_delta: the
  * next ray is a path's last, and light sampling has already counted all emitters but those that a delta lobe finds. */
 static int scatter(const struct integrator *it, struct batch *b, int n, int vertex, bool only_delta)
@@ -42,6 +82,8 @@ static int scatter(const struct integrator *it, struct batch *b, int n, int vert
     const bool chooses = chooses_light(it), by_normal = chooses || it->scene->environment != NULL;
     const bool two = it->records->only_diffuse && vertex < first_at_risk(&it->opt);
     draw_numbers(it, b, 0, n, (struct draws){vertex + 1, PURPOSE_BSDF, 1, .used = two ? 2 : 4});
+    if (it->guide != NULL)
+        guide(it, b, n, vertex);
     for (int k = 0; k < n; k += LANES) {
         unsigned there = lanes_there(k, n), mask = b->goes_on[k / LANES];
         if (!mask) {
@@ -62,6 +104,8 @@ static int scatter(const struct integrator *it, struct batch *b, int n, int vert
         if (only_delta)
             ok &= s.delta;
         rgbv throughput = rgb_mulv(rgb_load(&b->throughput, k), s.weight);
+        if (it->guide != NULL)
+            throughput = rgb_scalev(throughput, 1 / vf_load_any(b->guided + k));
         vf eta2 = vf_load_any(b->eta2 + k) * s.eta2;
         vf go_on = survival(&it->opt, vertex, throughput, eta2);
         vi at_risk = vf_lt(go_on, vf_set(1));

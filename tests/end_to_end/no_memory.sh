@@ -67,6 +67,7 @@ no_memory "render: a sky (.exr)" "${draw[@]}" -s 2 -e "$scenes/46_sky.exr" -f x.
 no_memory "render: textures" "${draw[@]}" -s 2 -f x.exr "$scenes/29_textures.dae"
 no_memory "render: the assignment's rule" "${draw[@]}" -s 24 -a 4 0.3 -f x.exr -f x.png "$point"
 no_memory "render: a pilot" "${draw[@]}" -s 24 --adaptive-unbiased 0.3 --pilot 4 -f x.exr -f x.png "$point"
+no_memory "render: guiding" "${draw[@]}" -s 2 --guiding on -f x.exr "$scenes/22_glass_sphere.dae"
 for accel in bruteforce centroid sah; do
     no_memory "render: $accel" "${draw[@]}" --accel $accel --sampler sobol -s 2 -f x.exr "$scenes/22_glass_sphere.dae"
 done

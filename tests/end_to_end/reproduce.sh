@@ -37,7 +37,7 @@ cmp -s "$tmp/together.exr" "$tmp/together.was" || { echo "not ok reproduce: shor
 again "layers" -s 5 --aov $scene
 again "a share of the samples" --samples 3:7 $scene
 again "a cell" -s 5 -p 3 2 11 9 $scene
-again "sobol, light samples, roulette" -s 4 --sampler sobol -l 2 --roulette 0.7 --seed 18446744073709551615 $scene
+again "sobol, guiding, light samples, roulette" -s 4 --sampler sobol --guiding on -l 2 --roulette 0.7 --seed 18446744073709551615 $scene
 again "the assignment's adaptive rule" -s 24 -a 4 0.3 $scene
 again "a pilot" -s 24 --adaptive-unbiased 0.3 --pilot 4 $scene
 again "a pilot, without -s" --adaptive-unbiased 0.3 --pilot 4 $scene

@@ -39,6 +39,7 @@ for scene in "$@"; do
 done
 same_bits "sobol" --sampler sobol "$first"
 same_bits "the assignment's adaptive rule" -a 2 0.5 "$first"
+same_bits "guiding" --guiding on "$first"
 same_bits "a pilot" --adaptive-unbiased 0.3 --pilot 4 "$first"
 same_bits "layers" --aov "$first"
 same_bits "one path at a time" --isa scalar "$first"

@@ -37,6 +37,7 @@ static bool render_ours(enum bench_engine engine, const struct bench_view *v, in
                        .light_samples = 1,
                        .roulette = ROULETTE_THROUGHPUT,
                        .isa = v->isa,
+                       .guiding = engine == BENCH_SOBOL,
                        .sampler = {engine == BENCH_SOBOL ? SAMPLER_SOBOL : SAMPLER_INDEPENDENT,
                                    seed}},
         .width = v->camera.width,

@@ -10,7 +10,7 @@
 enum bench_engine {
     BENCH_LIGHT,  /* ours, --direct light: as the tracer on Embree */
     BENCH_MIS,    /* ours, --direct mis, the default: as Cycles */
-    BENCH_SOBOL,  /* the same with --sampler sobol */
+    BENCH_SOBOL,  /* the same with --sampler sobol --guiding on */
     BENCH_EMBREE, /* embree_tracer.h */
     BENCH_CYCLES,
     BENCH_POVRAY, /* bench_povray.c; spp is a square */

@@ -37,7 +37,7 @@ in_jobs() {
     tell "$name" "$why"
 }
 in_jobs "cells beside each other" 6 again -s 5 --aov "$scene"
-in_jobs "more jobs than sixteens of rows" 23 again -s 3 --sampler sobol "$scene"
+in_jobs "more jobs than sixteens of rows" 23 again -s 3 --sampler sobol --guiding on "$scene"
 in_jobs "the assignment's adaptive rule" 2 once -s 24 -a 4 0.3 "$scene"
 in_jobs "a pilot, a part of the samples of a cell, an environment" 2 once -s 24 --samples 3:20 -p 5 4 27 21 --adaptive-unbiased 0.3 --pilot 4 \
     -e reference/scenes/46_sky.exr -- reference/scenes/46_sky.dae
