@@ -118,14 +118,14 @@ $(1)/$(2)_$(3).c.o: $(2).c | $(4)
 endef
 
 # A whole build below DIRECTORY, with the compiler and flags that are set for it: $(call
-# tree,DIRECTORY,PACKAGES,KERNELS), KERNELS: the directory of the kernels' objects, if another.
+# tree,DIRECTORY,PACKAGES,KERNELS), KERNELS: the kernels' objects, if others than its own.
 define tree
 $(1)/%.c.o: %.c | $(2)
 	$$(compile_c)
 $(1)/%.cc.o: %.cc | $(2)
 	$$(compile_cxx)
 $(foreach k,$(BY_ISA),$(foreach i,$(call isas_of,$(k)),$(eval $(call kernel_object,$(1),$(k),$(i),$(2)))))
-$(1)/libassay.a: $(call obj,$(1),$(SOURCES)) $(call obj,$(or $(3),$(1)),$(KERNELS))
+$(1)/libassay.a: $(call obj,$(1),$(SOURCES)) $(or $(3),$(call obj,$(1),$(KERNELS)))
 	$$(archive)
 $(1)/pathtracer: $(1)/renderer/pathtracer/pathtracer.c.o $(1)/libassay.a
 	$$(link)

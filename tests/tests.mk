@@ -34,33 +34,38 @@ CHECKED  = $(filter-out $(addprefix %/,$(PLAIN)),$(call program,$(BUILD)/san,$(T
 
 # -g1: a finding needs no more than file and line, and -g doubles the compile time of the kernels.
 SANITIZE := -O1 -g1 -fno-omit-frame-pointer -fno-sanitize-recover=all -fsanitize=address,undefined
+# Private: a build's flags are not those of objects that it takes from another.
 # Builds: san with ASan and UBSan; clang for its warnings and for the fuzzers; on demand tsan with ThreadSanitizer and
 # cov with clang's coverage counters.
-$(BUILD)/san/%: OPT := $(SANITIZE)
+$(BUILD)/san/%: private OPT := $(SANITIZE)
 # Files in which tests spend most of their time are worth more optimisation.
 BUSY := renderer/bvh/bvh tools/compare/hint tools/diagnose/bug_fit tools/diagnose/signature tools/exact/permutation tools/grade/difference tools/images/flip
 $(BUSY:%=$(BUILD)/san/%.c.o): OPT = $(SANITIZE:-O1=-O2)
-$(BUILD)/san/%: WERROR := 1
+$(BUILD)/san/%: private WERROR := 1
 $(BUILD)/tests/%: WERROR := 1
-$(BUILD)/clang/%: CC := clang
-$(BUILD)/clang/%: CXX := clang++
-$(BUILD)/clang/%: OPT := $(SANITIZE),fuzzer-no-link
-$(BUILD)/clang/%: WERROR := 1
-$(BUILD)/tsan/%: OPT := -O1 -g -fno-omit-frame-pointer -fsanitize=thread
-$(BUILD)/cov/%: CC := clang
-$(BUILD)/cov/%: CXX := clang++
+$(BUILD)/clang/%: private CC := clang
+$(BUILD)/clang/%: private CXX := clang++
+$(BUILD)/clang/%: private OPT := $(SANITIZE),fuzzer-no-link
+$(BUILD)/clang/%: private WERROR := 1
+$(BUILD)/tsan/%: private OPT := -O1 -g -fno-omit-frame-pointer -fsanitize=thread
+$(BUILD)/cov/%: private CC := clang
+$(BUILD)/cov/%: private CXX := clang++
 # Without -g, on which clang 14 crashes in the kernels of sixteen lanes.
-$(BUILD)/cov/%: OPT := -O2 -fprofile-instr-generate -fcoverage-mapping
-$(BUILD)/cov/%: WERROR := 1
+$(BUILD)/cov/%: private OPT := -O2 -fprofile-instr-generate -fcoverage-mapping
+$(BUILD)/cov/%: private WERROR := 1
 # Code that no fuzzer runs is compiled without sanitizers, in a fifth of the time; a fuzzer that ran it would abort
 # (tests/fuzz/fuzz.c).
 UNFUZZED := $(addprefix renderer/,bvh shading transport pathtracer) reference/truth \
   $(patsubst %/,%,$(sort $(dir $(wildcard reference/*/export_*.h)))) \
   $(addprefix tools/,stats compare sequential plots report validate converge commands)
 $(foreach d,$(UNFUZZED),$(eval $(BUILD)/clang/$(d)/%: OPT := -O0 -finstrument-functions))
-$(foreach b,san tsan cov,$(eval $(call tree,$(BUILD)/$(b),$(BUILD)/deps-test)))
+$(foreach b,tsan cov,$(eval $(call tree,$(BUILD)/$(b),$(BUILD)/deps-test)))
+# Sanitizers see what runs: one lane, and eight or sixteen of the widest instructions here. SSE4.2 has the source of AVX2; of both the
+# tests compare the bits with those of one lane.
+UNSANITIZED := $(filter %_sse42.c $(if $(shell grep -s avx512vl /proc/cpuinfo),,%_avx512.c),$(KERNELS))
+$(eval $(call tree,$(BUILD)/san,$(BUILD)/deps-test,$(call obj,$(BUILD),$(UNSANITIZED)) $(call obj,$(BUILD)/san,$(filter-out $(UNSANITIZED),$(KERNELS)))))
 # Clang only checks the syntax of the kernels, in a twentieth of the time; the fuzzers are linked with gcc's kernels.
-$(eval $(call tree,$(BUILD)/clang,$(BUILD)/deps-test,$(BUILD)))
+$(eval $(call tree,$(BUILD)/clang,$(BUILD)/deps-test,$(call obj,$(BUILD),$(KERNELS))))
 
 define test_program
 $(call program,$(1),$(2)): $(1)/$(2).o
