@@ -81,7 +81,7 @@ static bool completes(const struct small_scene *f, int i, int k, int j)
     dvec3 o = corner_of(f, i, k), s = corner_of(f, i, (k + 1) % 3);
     dvec3 t = corner_of(f, i, (k + 2) % 3), q = corner_of(f, j, other);
     const dvec3 off = d3_sub(q, d3_sub(d3_add(s, t), o));
-    const double most = 8 * FLT_EPSILON * (double)f->reach;
+    const double most = FLAT_TOLERANCE * (double)f->reach;
     return fabs(off.x) <= most && fabs(off.y) <= most && fabs(off.z) <= most;
 }
 
@@ -109,6 +109,61 @@ static void fill_faces(struct small_scene *f)
     }
 }
 
+/* The side of the box that a face fills, -1: none. Four different corners that are corners of the box, and in one of
+ * its sides, are that side. */
+static int side_of(const struct small_scene *f, const struct flat_face *face)
+{
+    const float most = FLAT_TOLERANCE * f->reach;
+    unsigned sides = face->is_triangle ? 0 : (1u << 6) - 1;
+    for (int k = 0; k < 6; k++) {
+        const float *p = f->corner[f->triangle[face->prim[k / 3]].corner[k % 3]];
+        for (int a = 0; a < 3; a++) {
+            const bool at_high = fabsf(p[a] - f->high[a]) <= most;
+            const bool at_low = fabsf(p[a] - f->low[a]) <= most;
+            if (!at_high && !at_low)
+                return -1;
+            sides &= ~((at_high ? 0 : 1u << 2 * a) | (at_low ? 0 : 2u << 2 * a));
+        }
+    }
+    return sides == 0 ? -1 : __builtin_ctz(sides);
+}
+
+/* Finds the room, and moves its walls to the end of face[]. */
+static void find_room(struct small_scene *f)
+{
+    struct flat_face wall[WIDE_FLAT];
+    int num_open = 0;
+    for (int a = 0; a < 3; a++) {
+        f->low[a] = INFINITY;
+        f->high[a] = -INFINITY;
+        for (int i = 0; i < f->num_corners; i++) {
+            f->low[a] = minf(f->low[a], f->corner[i][a]);
+            f->high[a] = maxf(f->high[a], f->corner[i][a]);
+        }
+    }
+    for (int k = 0; k < 6; k++)
+        memset(&f->side[k][SIDE_PRIM], 0xff, sizeof(int32_t));
+    for (int i = 0; i < f->num_faces; i++) {
+        const struct flat_face face = f->face[i];
+        const int k = side_of(f, &face);
+        int32_t taken = -1;
+        if (k >= 0)
+            memcpy(&taken, &f->side[k][SIDE_PRIM], sizeof taken);
+        if (k < 0 || taken >= 0) {
+            f->face[num_open++] = face;
+            continue;
+        }
+        wall[f->num_walls++] = face;
+        for (int a = 0; a < 4; a++)
+            f->side[k][SIDE_DIAGONAL + a] = face.u_row[a] + face.v_row[a] - (a == 3);
+        f->side[k][SIDE_PER_AREA] = face.per_area;
+        memcpy(&f->side[k][SIDE_PRIM], face.prim, sizeof face.prim);
+    }
+    memcpy(f->face + num_open, wall, (size_t)f->num_walls * sizeof *wall);
+    if (f->num_walls < 4)
+        f->num_walls = 0;
+}
+
 void small_scene_fill(const struct scene *s, const uint32_t *prim, int num, struct small_scene *f)
 {
     *f = (struct small_scene){0};
@@ -134,4 +189,6 @@ void small_scene_fill(const struct scene *s, const uint32_t *prim, int num, stru
         memcpy(f->sphere[f->num_spheres++], q, sizeof q);
     }
     fill_faces(f);
+    if (f->quick)
+        find_room(f);
 }

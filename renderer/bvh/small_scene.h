@@ -20,6 +20,10 @@ struct flat_face {
     bool is_triangle; /* prim[0] alone */
 };
 
+/* Words of the record of a room's side: u + v - 1 of its wall, then that wall's per_area and prim[], as integers'
+ * bits; -1: no wall. */
+enum { SIDE_DIAGONAL = 0, SIDE_PER_AREA = 4, SIDE_PRIM = 5, SIDE_WORDS = 8 };
+
 struct small_scene {
     int num_corners, num_edges, num_triangles, num_spheres, num_faces;
     float corner[FLAT_CORNERS][3];
@@ -28,8 +32,14 @@ struct small_scene {
         uint8_t corner[3];
         uint8_t edge[3]; /* opposite each corner: twice its number, plus one if it runs backwards */
     } triangle[WIDE_FLAT];
-    float sphere[WIDE_FLAT][4]; /* centre, radius */
-    struct flat_face face[WIDE_FLAT];
+    float sphere[WIDE_FLAT][4];       /* centre, radius */
+    struct flat_face face[WIDE_FLAT]; /* the walls of the room last */
+    /* The box around the triangles, if faces fill at least four of its sides, to FLAT_TOLERANCE reach, as the walls of a
+     * Cornell box do: of these walls a ray from inside meets the one where it leaves the box, or none, and a ray that
+     * also ends inside meets none. */
+    int num_walls; /* 0: no room */
+    float low[3], high[3];
+    float side[6][SIDE_WORDS];      /* 2 axis + 1 if low */
     float row[WIDE_FLAT][FLAT_ROW]; /* of a triangle: its corners, one after the other */
     int32_t number[WIDE_FLAT]; /* of each triangle, then of each sphere, in the scene; ascending */
     float reach;               /* largest coordinate of a corner */
@@ -44,6 +54,9 @@ struct small_scene {
  * the 32 FLT_EPSILON by which rays are moved off a surface, or that surface would always be in doubt. */
 #define FLAT_ERROR (512 * FLT_EPSILON)
 #define FLAT_SLACK (16 * FLT_EPSILON)
+/* What may be off by so much of the reach is taken for equal: the fourth corner of a parallelogram, a wall and the side
+ * of the room. */
+#define FLAT_TOLERANCE (8 * FLT_EPSILON)
 
 /* Fills *f with up to WIDE_FLAT primitives of a scene; prim[] must ascend. */
 void small_scene_fill(const struct scene *s, const uint32_t *prim, int num, struct small_scene *f);

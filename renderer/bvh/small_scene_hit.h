@@ -184,6 +184,59 @@ INLINE struct quick_hit quick_face(const struct flat_face *face, const struct qu
     return h;
 }
 
+/* Lanes of points inside the room by more than the margin. */
+INLINE vi in_room(const struct small_scene *f, const vf p[3], vf margin)
+{
+    vi in = vi_set(-1);
+    for (int a = 0; a < 3; a++)
+        in &= vf_lt(f->low[a] + margin, p[a]) & vf_lt(p[a], f->high[a] - margin);
+    return in;
+}
+
+/* What a quick search for the nearest hit knows: it is `prim`, at a distance in (low, high), if `sure` is positive and
+ * `second`, from where the next one may be, is beyond. worst: largest error. */
+struct nearest {
+    vf low, high, second, sure, worst;
+    vi prim;
+};
+
+/* Starts with the wall where rays from inside the room leave it. Returns the lanes that leave it further from its edges
+ * than where walls and rounding are. */
+INLINE vi leave_room(const struct small_scene *f, const struct rayv *q, const struct quick *k,
+                     struct nearest *n)
+{
+    const vf far = vf_set(INFINITY), zero = vf_set(0), margin = 4 * k->slack;
+    vf t = far, steep = zero, w[COLUMNS], p[3];
+    vi side = vi_set(0), safe = vi_set(-1);
+    int32_t number[LANES];
+    for (int a = 0; a < 3; a++) {
+        vi down = vf_lt(q->d[a], zero);
+        vf inv = 1 / vf_abs(q->d[a]);
+        vf at = vf_abs(vf_select(down, vf_set(f->low[a]), vf_set(f->high[a])) - q->o[a]) * inv;
+        vi nearer = vf_lt(at, t);
+        t = vf_min(at, t);
+        steep = vf_select(nearer, inv, steep);
+        side = vi_select(nearer, 2 * a - down, side);
+    }
+    for (int a = 0; a < 3; a++) {
+        p[a] = mul_add(t, q->d[a], q->o[a]);
+        vi in = vf_lt(f->low[a] + margin, p[a]) & vf_lt(p[a], f->high[a] - margin);
+        safe &= in | vi_eq(side & vi_set(6), vi_set(2 * a));
+    }
+    vi_store_any(number, side);
+    gather_columns(f->side[0], SIDE_WORDS, number, w);
+    vf beyond = mul_add(w[0], p[0], mul_add(w[1], p[1], mul_add(w[2], p[2], w[3])));
+    vf error = k->error * (w[SIDE_PER_AREA] * steep), off = 2 * k->slack * steep;
+    n->prim = vi_select(vf_lt(zero, beyond), as_vi(w[SIDE_PRIM + 1]), as_vi(w[SIDE_PRIM]));
+    vi open = vi_lt(as_vi(w[SIDE_PRIM]), vi_set(0));
+    n->prim |= open;
+    n->low = vf_select(open, far, t - off);
+    n->high = vf_select(open, far, t + off);
+    n->sure = vf_abs(beyond) - 2 * error;
+    n->worst = vf_select(open, zero, error);
+    return safe;
+}
+
 /* Nearest hits by the quick form. Returns the lanes that it could decide; *best is undefined in the
  * others. */
 INLINE vi list_closest_quick(const struct small_scene *f, const struct rayv *q,
@@ -191,9 +244,15 @@ INLINE vi list_closest_quick(const struct small_scene *f, const struct rayv *q,
 {
     const struct quick k = quick_init(f, q);
     const vf far = vf_set(INFINITY), zero = vf_set(0);
-    vf low = far, high = far, second = far, sure = zero, worst = zero, sphere_t = far;
-    vi prim = vi_set(-1);
-    for (int i = 0; i < f->num_faces; i++) {
+    struct nearest n = {far, far, far, zero, zero, vi_set(-1)};
+    vf sphere_t = far;
+    vi safe = vi_set(-1);
+    int num_faces = f->num_faces;
+    if (f->num_walls > 0 && bits(in_room(f, q->o, k.slack)) == ALL_LANES) {
+        safe = leave_room(f, q, &k, &n);
+        num_faces -= f->num_walls;
+    }
+    for (int i = 0; i < num_faces; i++) {
         const struct flat_face *face = &f->face[i];
         const struct quick_plane p = quick_plane(face, q);
         struct quick_hit h = quick_face(face, &p, q, &k);
@@ -205,13 +264,13 @@ INLINE vi list_closest_quick(const struct small_scene *f, const struct rayv *q,
             surely = vf_min(surely, vf_abs(beyond) - 2 * h.error);
             number = vi_select(vf_lt(zero, beyond), vi_set(face->prim[1]), number);
         }
-        vi nearer = vf_lt(begin, low);
-        second = vf_min(second, vf_max(begin, low));
-        low = vf_min(begin, low);
-        high = vf_select(nearer, h.high, high);
-        sure = vf_select(nearer, surely, sure);
-        prim = vi_select(nearer, number, prim);
-        worst = vf_max(h.error, worst);
+        vi nearer = vf_lt(begin, n.low);
+        n.second = vf_min(n.second, vf_max(begin, n.low));
+        n.low = vf_min(begin, n.low);
+        n.high = vf_select(nearer, h.high, n.high);
+        n.sure = vf_select(nearer, surely, n.sure);
+        n.prim = vi_select(nearer, number, n.prim);
+        n.worst = vf_max(h.error, n.worst);
     }
     for (int i = 0; i < f->num_spheres; i++) {
         vf t = far;
@@ -219,24 +278,25 @@ INLINE vi list_closest_quick(const struct small_scene *f, const struct rayv *q,
         if (!bits(hit))
             continue;
         vf begin = vf_select(hit, t, far);
-        vi nearer = vf_lt(begin, low);
-        second = vf_min(second, vf_max(begin, low));
-        low = vf_min(begin, low);
-        high = vf_select(nearer, t, high);
+        vi nearer = vf_lt(begin, n.low);
+        n.second = vf_min(n.second, vf_max(begin, n.low));
+        n.low = vf_min(begin, n.low);
+        n.high = vf_select(nearer, t, n.high);
         sphere_t = vf_select(nearer, t, sphere_t);
-        sure = vf_select(nearer, vf_set(1), sure);
-        prim = vi_select(nearer, vi_set(f->num_triangles + i), prim);
+        n.sure = vf_select(nearer, vf_set(1), n.sure);
+        n.prim = vi_select(nearer, vi_set(f->num_triangles + i), n.prim);
     }
-    vi nothing = vf_lt(q->tmax, low) | vf_eq(low, far);
-    vi known = vf_lt(zero, sure) & vf_lt(q->tmin, low) & vf_lt(high, q->tmax) & vf_lt(high, second);
+    vi nothing = vf_lt(q->tmax, n.low) | vf_eq(n.low, far);
+    vi known = vf_lt(zero, n.sure) & vf_lt(q->tmin, n.low) & vf_lt(n.high, q->tmax) &
+               vf_lt(n.high, n.second);
     known &= ~nothing;
-    prim = vi_select(known, prim, vi_set(-1));
+    n.prim = vi_select(known, n.prim, vi_set(-1));
     /* Distance and barycentric coordinates are recomputed by the exact test. */
     const vi is_x = vi_eq(q->axis, vi_set(0)), is_y = vi_eq(q->axis, vi_set(1));
-    vi flat = vi_lt(prim, vi_set(f->num_triangles));
+    vi flat = vi_lt(n.prim, vi_set(f->num_triangles));
     int32_t number[LANES];
     vf w[2][COLUMNS], x[3], y[3], z[3], t = far, u = zero, v = zero;
-    vf_store_any(number, (vf)(prim & flat & ~vi_lt(prim, vi_set(0))));
+    vf_store_any(number, (vf)(n.prim & flat & ~vi_lt(n.prim, vi_set(0))));
     gather_columns(f->row[0], FLAT_ROW, number, w[0]);
     gather_columns(f->row[0] + COLUMNS, FLAT_ROW, number, w[1]);
     for (int c = 0; c < 3; c++) {
@@ -251,8 +311,8 @@ INLINE vi list_closest_quick(const struct small_scene *f, const struct rayv *q,
     best->t = vf_select(nothing, q->tmax, vf_select(ball, sphere_t, t));
     best->u = vf_select(known & flat, u, zero);
     best->v = vf_select(known & flat, v, zero);
-    best->prim = prim;
-    return k.fit & vf_lt(worst, far) & (nothing | ball | (known & pass));
+    best->prim = n.prim;
+    return k.fit & safe & vf_lt(n.worst, far) & (nothing | ball | (known & pass));
 }
 
 /* Lanes that are occluded; *known: lanes that the quick form could decide. */
@@ -262,7 +322,14 @@ INLINE vi list_occluded_quick(const struct small_scene *f, const struct rayv *q,
     const vf zero = vf_set(0);
     vf worst = zero;
     vi met = vi_set(0), maybe = vi_set(0);
-    for (int i = 0; i < f->num_faces; i++) {
+    int num_faces = f->num_faces;
+    if (f->num_walls > 0) {
+        const vf end[3] = {mul_add(k.end, q->d[0], q->o[0]), mul_add(k.end, q->d[1], q->o[1]),
+                           mul_add(k.end, q->d[2], q->o[2])};
+        if (bits(in_room(f, q->o, k.slack) & in_room(f, end, 2 * k.slack)) == ALL_LANES)
+            num_faces -= f->num_walls;
+    }
+    for (int i = 0; i < num_faces; i++) {
         const struct quick_plane p = quick_plane(&f->face[i], q);
         if (bits(quick_clear(&p, &k)) == ALL_LANES)
             continue;
