@@ -95,10 +95,16 @@ INLINE unsigned bits(vi mask)
 {
     return (unsigned)_mm256_movemask_ps((__m256)mask);
 }
+/* This and spread_flags() by tables for four lanes each: pdep and pext would be shorter, but AMD's processors before Zen 3
+ * take them bit by bit. */
 INLINE vi front_order(unsigned mask)
 {
-    uint64_t bytes = _pdep_u64(mask, 0x0101010101010101) * 255;
-    uint64_t order = _pext_u64(0x0706050403020100, bytes);
+    static const uint32_t low[16] = {0, 0,     1,     0x100,   2,     0x200,   0x201,   0x20100,
+                                     3, 0x300, 0x301, 0x30100, 0x302, 0x30200, 0x30201, 0x3020100},
+                          high[16] = {0, 4,     5,     0x504,   6,     0x604,   0x605,   0x60504,
+                                      7, 0x704, 0x705, 0x70504, 0x706, 0x70604, 0x70605, 0x7060504};
+    const int bits_below = 8 * __builtin_popcount(mask & 15);
+    const uint64_t order = low[mask & 15] | (uint64_t)high[mask >> 4] << bits_below;
     return (vi)_mm256_cvtepu8_epi32(_mm_cvtsi64_si128((long long)order));
 }
 INLINE vf pick(vf a, vi order)
@@ -109,11 +115,23 @@ INLINE vi shuffle_bytes(vi table, vi which)
 {
     return (vi)_mm256_shuffle_epi8((__m256i)table, (__m256i)which);
 }
+/* The lowest bits of b, moved to the bits of m: four lanes of each. */
+#define SPREAD(m, b)                                                                               \
+    (((m)&1 & (b)) | ((m)&2 & (b) >> ((m)&1) << 1) |                                               \
+     ((m)&4 & (b) >> (((m)&1) + ((m) >> 1 & 1)) << 2) |                                            \
+     ((m)&8 & (b) >> (((m)&1) + ((m) >> 1 & 1) + ((m) >> 2 & 1)) << 3))
+#define SPREAD_4(m, b) SPREAD(m, b), SPREAD(m, (b) + 1), SPREAD(m, (b) + 2), SPREAD(m, (b) + 3)
+#define SPREAD_16(m)   SPREAD_4(m, 0), SPREAD_4(m, 4), SPREAD_4(m, 8), SPREAD_4(m, 12)
+#define SPREAD_64(m)   SPREAD_16(m), SPREAD_16(m + 1), SPREAD_16(m + 2), SPREAD_16(m + 3)
 INLINE unsigned spread_flags(const void *flags, unsigned mask)
 {
+    static const uint8_t spread[256] = {SPREAD_64(0), SPREAD_64(4), SPREAD_64(8), SPREAD_64(12)};
     uint64_t bytes;
     memcpy(&bytes, flags, sizeof bytes);
-    return _pdep_u32((unsigned)_pext_u64(bytes, 0x0101010101010101), mask);
+    const unsigned packed = (unsigned)_mm_movemask_epi8(_mm_cvtsi64_si128((long long)(bytes << 7)));
+    const unsigned next = packed >> __builtin_popcount(mask & 15);
+    const unsigned low = spread[(mask & 15) << 4 | (packed & 15)];
+    return low | (unsigned)spread[(mask & 0xf0) | (next & 15)] << 4;
 }
 #else
 union vf_halves {
