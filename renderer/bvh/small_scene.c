@@ -131,7 +131,7 @@ static int side_of(const struct small_scene *f, const struct flat_face *face)
 /* Finds the room, and moves its walls to the end of face[]. */
 static void find_room(struct small_scene *f)
 {
-    struct flat_face wall[WIDE_FLAT];
+    struct flat_face wall[WIDE_FLAT] = {0};
     int num_open = 0;
     for (int a = 0; a < 3; a++) {
         f->low[a] = INFINITY;

@@ -122,13 +122,12 @@ INLINE vi shuffle_bytes(vi table, vi which)
      ((m)&8 & (b) >> (((m)&1) + ((m) >> 1 & 1) + ((m) >> 2 & 1)) << 3))
 #define SPREAD_4(m, b) SPREAD(m, b), SPREAD(m, (b) + 1), SPREAD(m, (b) + 2), SPREAD(m, (b) + 3)
 #define SPREAD_16(m)   SPREAD_4(m, 0), SPREAD_4(m, 4), SPREAD_4(m, 8), SPREAD_4(m, 12)
-#define SPREAD_64(m)   SPREAD_16(m), SPREAD_16(m + 1), SPREAD_16(m + 2), SPREAD_16(m + 3)
+#define SPREAD_64(m)   SPREAD_16(m), SPREAD_16((m) + 1), SPREAD_16((m) + 2), SPREAD_16((m) + 3)
 INLINE unsigned spread_flags(const void *flags, unsigned mask)
 {
     static const uint8_t spread[256] = {SPREAD_64(0), SPREAD_64(4), SPREAD_64(8), SPREAD_64(12)};
-    uint64_t bytes;
-    memcpy(&bytes, flags, sizeof bytes);
-    const unsigned packed = (unsigned)_mm_movemask_epi8(_mm_cvtsi64_si128((long long)(bytes << 7)));
+    const __m128i bytes = _mm_slli_epi16(_mm_loadl_epi64(flags), 7);
+    const unsigned packed = (unsigned)_mm_movemask_epi8(bytes) & 255;
     const unsigned next = packed >> __builtin_popcount(mask & 15);
     const unsigned low = spread[(mask & 15) << 4 | (packed & 15)];
     return low | (unsigned)spread[(mask & 0xf0) | (next & 15)] << 4;

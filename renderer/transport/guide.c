@@ -137,10 +137,13 @@ static void tabulate_all(const struct pilot *t, size_t num, double *sum, double 
     for (size_t p = 0; p < GUIDE_PLACES; p++) {
         const double *taught = count + p * GUIDE_BINS;
         float *of = table + p * GUIDE_ROWS * GUIDE_SIDE;
-        if (memcmp(taught, nothing, sizeof nothing) == 0)
-            memcpy(of, uniform, sizeof uniform);
-        else
+        double directions = 0;
+        for (int k = 0; k < GUIDE_BINS; k++)
+            directions += taught[k];
+        if (directions > 0)
             guide_tabulate(sum + p * GUIDE_BINS, taught, of);
+        else
+            memcpy(of, uniform, sizeof uniform);
     }
 }
 
