@@ -98,14 +98,14 @@ static int scatter(const struct integrator *it, struct batch *b, int n, int vert
         sample_lobes(it->records->material, (const int32_t *)b->material + k,
                      vi_load_any(b->bits + k), rgb_load(&b->reflectance, k), b->front + k, mask, wo,
                      u, &s);
+        if (it->guide != NULL)
+            s.weight = rgb_scalev(s.weight, 1 / vf_load_any(b->guided + k));
         vec3v wi = frame_to_worldv(&f, s.wi);
         /* Both normals have to agree on which side the light leaves. */
         vi ok = vf_lt(zero, s.pdf_w) & vf_lt(zero, s.wi.z * dotv(v3_load(&b->ng, k), wi));
         if (only_delta)
             ok &= s.delta;
         rgbv throughput = rgb_mulv(rgb_load(&b->throughput, k), s.weight);
-        if (it->guide != NULL)
-            throughput = rgb_scalev(throughput, 1 / vf_load_any(b->guided + k));
         vf eta2 = vf_load_any(b->eta2 + k) * s.eta2;
         vf go_on = survival(&it->opt, vertex, throughput, eta2);
         vi at_risk = vf_lt(go_on, vf_set(1));
