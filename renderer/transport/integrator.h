@@ -104,7 +104,6 @@ struct batch {
     uint32_t slot[BATCH_ROOM], slot_pixel[BATCH_ROOM], slot_sample[BATCH_ROOM];
     float numbers[4][BATCH_ROOM]; /* random numbers, in rows of LANES paths for one purpose */
     struct rgbs gathered, reflectance;
-    float guided[BATCH_ROOM];  /* density of the numbers from which the next direction comes */
     struct guide_notes *notes; /* NULL: not the pilot */
     int32_t bits[BATCH_ROOM];  /* of the material's record */
     /* One element per LANES paths, a bit for each. */

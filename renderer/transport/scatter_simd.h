@@ -48,28 +48,27 @@ static void guide_note(struct batch *b, int k, unsigned mask, vi bin, int vertex
     }
 }
 
-/* Guides the numbers from which the paths' next directions come, where the surface is diffuse, and stores the
- * densities; of others they are 1. */
+/* Guides the numbers from which the paths' next directions come, where the surface is diffuse, and divides throughput by
+ * their density. */
 static __attribute__((noinline)) void guide(const struct integrator *it, struct batch *b, int n,
                                             int vertex)
 {
     for (int k = 0; k < n; k += LANES) {
         unsigned mask = b->goes_on[k / LANES];
         vi diffuse = lanes_of(mask) & has_bits(vi_load_any(b->bits + k), 1 << MATERIAL_DIFFUSE);
-        vf density = vf_set(1);
-        if (bits(diffuse)) {
-            /* Elsewhere there may be no surface. */
-            vec3v p = v3_select(diffuse, v3_load(&b->p, k), v3_all(it->guide->low));
-            vf old[2] = {vf_load_any(b->numbers[0] + k), vf_load_any(b->numbers[1] + k)};
-            vf new[2] = {old[0], old[1]};
-            vi bin, place = guide_place(it->guide, p, v3_load(&b->ns, k));
-            density = vf_select(diffuse, guide_direction(it->guide, place, new, &bin), density);
-            vf_store_any(b->numbers[0] + k, vf_select(diffuse, new[0], old[0]));
-            vf_store_any(b->numbers[1] + k, vf_select(diffuse, new[1], old[1]));
-            if (b->notes != NULL && vertex < GUIDE_VERTICES)
-                guide_note(b, k, bits(diffuse), place * GUIDE_BINS + bin, vertex);
-        }
-        vf_store_any(b->guided + k, density);
+        if (!bits(diffuse))
+            continue;
+        /* Elsewhere there may be no surface. */
+        vec3v p = v3_select(diffuse, v3_load(&b->p, k), v3_all(it->guide->low));
+        vf old[2] = {vf_load_any(b->numbers[0] + k), vf_load_any(b->numbers[1] + k)};
+        vf new[2] = {old[0], old[1]};
+        vi bin, place = guide_place(it->guide, p, v3_load(&b->ns, k));
+        vf density = vf_select(diffuse, guide_direction(it->guide, place, new, &bin), vf_set(1));
+        vf_store_any(b->numbers[0] + k, vf_select(diffuse, new[0], old[0]));
+        vf_store_any(b->numbers[1] + k, vf_select(diffuse, new[1], old[1]));
+        if (b->notes != NULL && vertex < GUIDE_VERTICES)
+            guide_note(b, k, bits(diffuse), place * GUIDE_BINS + bin, vertex);
+        rgb_store(&b->throughput, k, rgb_scalev(rgb_load(&b->throughput, k), 1 / density));
     }
 }
 
@@ -98,8 +97,6 @@ static int scatter(const struct integrator *it, struct batch *b, int n, int vert
         sample_lobes(it->records->material, (const int32_t *)b->material + k,
                      vi_load_any(b->bits + k), rgb_load(&b->reflectance, k), b->front + k, mask, wo,
                      u, &s);
-        if (it->guide != NULL)
-            s.weight = rgb_scalev(s.weight, 1 / vf_load_any(b->guided + k));
         vec3v wi = frame_to_worldv(&f, s.wi);
         /* Both normals have to agree on which side the light leaves. */
         vi ok = vf_lt(zero, s.pdf_w) & vf_lt(zero, s.wi.z * dotv(v3_load(&b->ng, k), wi));
