@@ -110,9 +110,8 @@ static void *worker(void *arg)
         if (tile_of(j, t) < j->num_tiles)
             render_tile(j, b, tile_of(j, t));
     pthread_mutex_lock(&j->lock);
-    if (b != NULL) {
+    if (b != NULL)
         bvh_stats_add(&j->stats, &b->stats);
-    }
     if (--j->running == 0)
         pthread_cond_signal(&j->ended);
     pthread_mutex_unlock(&j->lock);
