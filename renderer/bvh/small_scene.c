@@ -60,6 +60,9 @@ static bool set_face(const struct small_scene *f, int i, int k, struct flat_face
     memcpy(face->normal, plane, sizeof face->normal);
     face->offset = -plane[3];
     face->per_area = (float)(1 / area);
+    const dvec3 ew = d3_sub(eu, ev);
+    double longest = sqrt(fmax(d3_dot(eu, eu), fmax(d3_dot(ev, ev), d3_dot(ew, ew))));
+    face->slack = (float)fmax(1, (double)f->reach * longest / (FLAT_THIN * area));
     face->prim[0] = face->prim[1] = i;
     face->is_triangle = true;
     return true;
@@ -109,11 +112,11 @@ static void fill_faces(struct small_scene *f)
     }
 }
 
-/* The side of the box that a face fills, -1: none. Four different corners that are corners of the box, and in one of
- * its sides, are that side. */
+/* The side of the box that a face fills, -1: none. A parallelogram whose four corners are corners of the box, all in one
+ * side, fills that side. */
 static int side_of(const struct small_scene *f, const struct flat_face *face)
 {
-    const float most = FLAT_TOLERANCE * f->reach;
+    const float most = ROOM_TOLERANCE * f->reach;
     unsigned sides = face->is_triangle ? 0 : (1u << 6) - 1;
     for (int k = 0; k < 6; k++) {
         const float *p = f->corner[f->triangle[face->prim[k / 3]].corner[k % 3]];
@@ -140,6 +143,8 @@ static void find_room(struct small_scene *f)
             f->low[a] = minf(f->low[a], f->corner[i][a]);
             f->high[a] = maxf(f->high[a], f->corner[i][a]);
         }
+        if (!(f->high[a] - f->low[a] >= f->reach / 4))
+            return;
     }
     for (int k = 0; k < 6; k++)
         memset(&f->side[k][SIDE_PRIM], 0xff, sizeof(int32_t));

@@ -16,6 +16,7 @@ enum { FLAT_CORNERS = 3 * WIDE_FLAT, FLAT_EDGES = 3 * WIDE_FLAT, FLAT_ROW = 16 }
 struct flat_face {
     float normal[3], offset, u_row[4], v_row[4];
     float per_area;   /* 1 over the area of the parallelogram */
+    float slack;      /* of FLAT_SLACK, 1 or more: that of a thin face */
     int32_t prim[2];  /* for u + v < 1, and above */
     bool is_triangle; /* prim[0] alone */
 };
@@ -34,9 +35,9 @@ struct small_scene {
     } triangle[WIDE_FLAT];
     float sphere[WIDE_FLAT][4];       /* centre, radius */
     struct flat_face face[WIDE_FLAT]; /* the walls of the room last */
-    /* The box around the triangles, if faces fill at least four of its sides, to FLAT_TOLERANCE reach, as the walls of a
-     * Cornell box do: of these walls a ray from inside meets the one where it leaves the box, or none, and a ray that
-     * also ends inside meets none. */
+    /* The box around the triangles, if it is nowhere thinner than reach/4 and faces fill at least four of its sides, to
+     * ROOM_TOLERANCE reach, as the walls of a Cornell box do: of these walls a ray from inside meets the one where it
+     * leaves the box, or none, and a ray that also ends inside meets none. */
     int num_walls; /* 0: no room */
     float low[3], high[3];
     float side[6][SIDE_WORDS];      /* 2 axis + 1 if low */
@@ -51,12 +52,14 @@ struct small_scene {
  * of the roundings of rows, products and sums in both, and of a fourth corner that is off by
  * 8 FLT_EPSILON m. t: FLAT_SLACK m / |normal.d|; the quick form's own roundings come to 14 FLT_EPSILON, those
  * of the exact test to 1 in no_self_intersection of tests/renderer/bvh/test_bvh.c. FLAT_SLACK has to be below
- * the 32 FLT_EPSILON by which rays are moved off a surface, or that surface would always be in doubt. */
+ * the 32 FLT_EPSILON by which rays are moved off a surface, or that surface would always be in doubt. The exact test's
+ * error grows with m over the face's shorter side: the slack of a face thinner than m / FLAT_THIN grows likewise. */
 #define FLAT_ERROR (512 * FLT_EPSILON)
 #define FLAT_SLACK (16 * FLT_EPSILON)
-/* What may be off by so much of the reach is taken for equal: the fourth corner of a parallelogram, a wall and the side
- * of the room. */
+#define FLAT_THIN  12
+/* So much of the reach may the fourth corner of a parallelogram be off, and a wall from its side of the room. */
 #define FLAT_TOLERANCE (8 * FLT_EPSILON)
+#define ROOM_TOLERANCE (2 * FLT_EPSILON)
 
 /* Fills *f with up to WIDE_FLAT primitives of a scene; prim[] must ascend. */
 void small_scene_fill(const struct scene *s, const uint32_t *prim, int num, struct small_scene *f);

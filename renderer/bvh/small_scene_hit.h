@@ -156,11 +156,11 @@ INLINE struct quick_plane quick_plane(const struct flat_face *face, const struct
 
 /* Lanes whose rays begin and end on the same side of the plane, too far from it for rounding to matter; at
  * the end twice as far, since k->end can be four times m. */
-INLINE vi quick_clear(const struct quick_plane *p, const struct quick *k)
+INLINE vi quick_clear(const struct flat_face *face, const struct quick_plane *p,
+                      const struct quick *k)
 {
-    vf end = mul_add(-k->end, p->nd, p->no);
-    return vf_lt(k->slack, vf_min(p->no, end - k->slack)) |
-           vf_lt(vf_max(p->no, end + k->slack), -k->slack);
+    vf end = mul_add(-k->end, p->nd, p->no), slack = k->slack * face->slack;
+    return vf_lt(slack, vf_min(p->no, end - slack)) | vf_lt(vf_max(p->no, end + slack), -slack);
 }
 
 INLINE struct quick_hit quick_face(const struct flat_face *face, const struct quick_plane *p,
@@ -177,14 +177,16 @@ INLINE struct quick_hit quick_face(const struct flat_face *face, const struct qu
                    mul_add(vf_set(vr[1]), y, mul_add(vf_set(vr[2]), z, vf_set(vr[3]))));
     vf steep = vf_abs(inv);
     struct quick_hit h = {.error = k->error * (face->per_area * steep), .sum = u + v};
-    vf off = k->slack * steep, rim = vf_min(u, v);
+    vf off = k->slack * face->slack * steep, rim = vf_min(u, v);
     h.inside = face->is_triangle ? vf_min(rim, 1 - h.sum) : vf_min(rim, vf_min(1 - u, 1 - v));
     h.low = t - off;
     h.high = t + off;
     return h;
 }
 
-/* Lanes of points inside the room by more than the margin. */
+/* Lanes of points inside the room by more than the margin: one slack where rays begin, of which ROOM_TOLERANCE is an eighth
+ * and the exact test's rounding less than the rest; two where they end, since that is computed; four beside an edge, so
+ * that the next wall is met clearly later. */
 INLINE vi in_room(const struct small_scene *f, const vf p[3], vf margin)
 {
     vi in = vi_set(-1);
@@ -193,15 +195,15 @@ INLINE vi in_room(const struct small_scene *f, const vf p[3], vf margin)
     return in;
 }
 
-/* What a quick search for the nearest hit knows: it is `prim`, at a distance in (low, high), if `sure` is positive and
- * `second`, from where the next one may be, is beyond. worst: largest error. */
+/* What a quick search has found: prim, between the distances low and high. It is right if sure > 0 and high < second,
+ * where the next candidate may begin. worst: the largest error met. */
 struct nearest {
     vf low, high, second, sure, worst;
     vi prim;
 };
 
-/* Starts with the wall where rays from inside the room leave it. Returns the lanes that leave it further from its edges
- * than where walls and rounding are. */
+/* Starts with the wall where rays from inside the room leave it. Returns the lanes whose exit is so far from the room's
+ * edges that neither tolerance nor rounding can put another wall before it. */
 INLINE vi leave_room(const struct small_scene *f, const struct rayv *q, const struct quick *k,
                      struct nearest *n)
 {
@@ -331,7 +333,7 @@ INLINE vi list_occluded_quick(const struct small_scene *f, const struct rayv *q,
     }
     for (int i = 0; i < num_faces; i++) {
         const struct quick_plane p = quick_plane(&f->face[i], q);
-        if (bits(quick_clear(&p, &k)) == ALL_LANES)
+        if (bits(quick_clear(&f->face[i], &p, &k)) == ALL_LANES)
             continue;
         struct quick_hit h = quick_face(&f->face[i], &p, q, &k);
         vi out = vf_lt(h.inside + h.error, zero) | vf_lt(h.high, q->tmin) | vf_lt(q->tmax, h.low);
