@@ -22,7 +22,7 @@ struct statement {
     struct rubric_check *check;
     bool varies; /* a statement with {variant} was read */
     /* Statements given so far, a bit for each row of the table: of the rubric, of the block. */
-    uint32_t given[2];
+    uint32_t given[2], limits; /* limits: of the kinds of 'limit' */
 };
 
 static char *take_word(struct statement *s)
@@ -106,32 +106,39 @@ static void take_margin(struct statement *s, const char *what, struct margin *ou
 
 static void read_limit(struct statement *s)
 {
+    enum { WALL, CPU, BUILD, MEMORY, BUILD_MEMORY, DISK, PROCESSES };
+    static const char *const kinds[] = {"wall",         "cpu",  "build",     "memory",
+                                        "build-memory", "disk", "processes", NULL};
     struct sandbox_limits *l = &s->r->limit;
-    char *what = take_word(s);
-    double v = 1;
-    if (strcmp(what, "wall") == 0)
-        take_number(s, "limit wall", 1, 1e5, &l->wall_s);
-    else if (strcmp(what, "cpu") == 0)
-        take_number(s, "limit cpu", 1, 1e5, &l->cpu_s);
-    else if (strcmp(what, "build") == 0)
-        take_number(s, "limit build", 1, 1e5, &s->r->build_s);
-    else if (strcmp(what, "processes") == 0)
-        take_int(s, "limit processes", 1, 4096, &l->processes);
-    else if (strcmp(what, "memory") == 0) {
-        if (take_number(s, "limit memory", 16, 1 << 20, &v))
-            l->memory = (size_t)(v * (1 << 20));
-    } else if (strcmp(what, "build-memory") == 0) {
-        if (take_number(s, "limit build-memory", 16, 1 << 20, &v))
-            s->r->build_memory = (size_t)(v * (1 << 20));
-    } else if (strcmp(what, "disk") == 0) {
-        if (take_number(s, "limit disk", 1, 1 << 20, &v)) {
-            l->disk = (size_t)(v * (1 << 20));
-            l->file = l->disk < l->file ? l->disk : l->file;
-        }
-    } else
+    char *what = take_word(s), word[32];
+    double mib = 1;
+    int k = 0;
+    while (kinds[k] != NULL && strcmp(what, kinds[k]) != 0)
+        k++;
+    if (kinds[k] == NULL) {
         rubric_mistake(
             s->m, s->line,
             "'limit %s' is none of wall, cpu, build, memory, build-memory, disk, processes", what);
+        return;
+    }
+    snprintf(word, sizeof word, "limit %s", kinds[k]);
+    if (s->limits >> k & 1)
+        rubric_mistake(s->m, s->line, "a second '%s'", word);
+    s->limits |= 1u << k;
+    if (k == WALL)
+        take_number(s, word, 1, 1e5, &l->wall_s);
+    else if (k == CPU)
+        take_number(s, word, 1, 1e5, &l->cpu_s);
+    else if (k == BUILD)
+        take_number(s, word, 1, 1e5, &s->r->build_s);
+    else if (k == PROCESSES)
+        take_int(s, word, 1, 4096, &l->processes);
+    else if (take_number(s, word, k == DISK ? 1 : 16, 1 << 20, &mib)) {
+        const size_t bytes = (size_t)(mib * (1 << 20));
+        *(k == MEMORY ? &l->memory : k == DISK ? &l->disk : &s->r->build_memory) = bytes;
+        if (k == DISK)
+            l->file = bytes < l->file ? bytes : l->file;
+    }
 }
 
 /* Appends one of several 'build' lines. */
@@ -362,7 +369,7 @@ static const struct member of_rubric[] = {{"rubric", TEXT, TO(rubric, title)},
                                           {"packages", TEXT, TO(rubric, packages)},
                                           {"total", NUMBER, TO(rubric, total), 0, 1000000},
                                           {"limit", .read = read_limit, .many = true},
-                                          {"budget", .read = read_budget, .many = true},
+                                          {"budget", .read = read_budget},
                                           {"mask", .read = read_mask},
                                           {"picture", .read = read_picture, .many = true},
                                           {"part", .read = read_part, .many = true},

@@ -186,6 +186,8 @@ TEST(each_mistake_is_named_with_its_line)
         {1, 2, "rubric a\nlimit patience 5", "limit patience"},
         {1, 2, "rubric a\nbudget wall 5", "of cpu"},
         {1, 2, "rubric a\nlimit wall long", "limit wall"},
+        {1, 4, "rubric a\nlimit wall 5\nlimit cpu 5\nlimit wall 6", "a second 'limit wall'"},
+        {1, 3, "rubric a\nbudget cpu 5\nbudget cpu 6", "a second 'budget'"},
         {1, 2, "rubric a\nlimit build-memory 1", "limit build-memory"},
         {1, 2, "rubric a\nbuild", "needs a text"},
         {1, 2, "rubric a\nrubric b", "second"},
