@@ -34,7 +34,7 @@ CHECKED  = $(filter-out $(addprefix %/,$(PLAIN)),$(call program,$(BUILD)/san,$(T
 
 # -g1: a finding needs no more than file and line, and -g doubles the compile time of the kernels.
 SANITIZE := -O1 -g1 -fno-omit-frame-pointer -fno-sanitize-recover=all -fsanitize=address,undefined
-# Private: a build's flags are not those of objects that it takes from another.
+# private: otherwise objects that a build takes from another would get its flags.
 # Builds: san with ASan and UBSan; clang for its warnings and for the fuzzers; on demand tsan with ThreadSanitizer and
 # cov with clang's coverage counters.
 $(BUILD)/san/%: private OPT := $(SANITIZE)
@@ -60,9 +60,10 @@ UNFUZZED := $(addprefix renderer/,bvh shading transport pathtracer) reference/tr
   $(addprefix tools/,stats compare sequential plots report validate converge commands)
 $(foreach d,$(UNFUZZED),$(eval $(BUILD)/clang/$(d)/%: OPT := -O0 -finstrument-functions))
 $(foreach b,tsan cov,$(eval $(call tree,$(BUILD)/$(b),$(BUILD)/deps-test)))
-# Sanitizers see what runs: one lane, and eight or sixteen of the widest instructions here. SSE4.2 has the source of AVX2; of both the
-# tests compare the bits with those of one lane.
+# Sanitizers see one lane, and eight or sixteen of the widest instructions here. SSE4.2 shares all but the operations on vectors with
+# AVX2, and has the bits of one lane (test_widths).
 UNSANITIZED := $(filter %_sse42.c $(if $(shell grep -s avx512vl /proc/cpuinfo),,%_avx512.c),$(KERNELS))
+$(call obj,$(BUILD),$(UNSANITIZED)): private WERROR := 1
 $(eval $(call tree,$(BUILD)/san,$(BUILD)/deps-test,$(call obj,$(BUILD),$(UNSANITIZED)) $(call obj,$(BUILD)/san,$(filter-out $(UNSANITIZED),$(KERNELS)))))
 # Clang only checks the syntax of the kernels, in a twentieth of the time; the fuzzers are linked with gcc's kernels.
 $(eval $(call tree,$(BUILD)/clang,$(BUILD)/deps-test,$(call obj,$(BUILD),$(KERNELS))))

@@ -95,8 +95,8 @@ INLINE unsigned bits(vi mask)
 {
     return (unsigned)_mm256_movemask_ps((__m256)mask);
 }
-/* This and spread_flags() by tables for four lanes each: pdep and pext would be shorter, but AMD's processors before Zen 3
- * take them bit by bit. */
+/* front_order() and spread_flags() look up four lanes at a time: pdep and pext would be shorter, but AMD's processors
+ * before Zen 3 take them bit by bit. */
 INLINE vi front_order(unsigned mask)
 {
     static const uint32_t low[16] = {0, 0,     1,     0x100,   2,     0x200,   0x201,   0x20100,
@@ -115,7 +115,7 @@ INLINE vi shuffle_bytes(vi table, vi which)
 {
     return (vi)_mm256_shuffle_epi8((__m256i)table, (__m256i)which);
 }
-/* The lowest bits of b, moved to the bits of m: four lanes of each. */
+/* pdep of four bits: bit k of b goes to the k-th lowest set bit of m. */
 #define SPREAD(m, b)                                                                               \
     (((m)&1 & (b)) | ((m)&2 & (b) >> ((m)&1) << 1) |                                               \
      ((m)&4 & (b) >> (((m)&1) + ((m) >> 1 & 1)) << 2) |                                            \

@@ -11,8 +11,7 @@
  * sampler. */
 static const uint64_t pilot_seed_mask = 0x5851f42d4c957f2d;
 
-/* Share of directions that are not guided: with what a place has not learned, a path's weight grows to 1/0.2 at
- * most. */
+/* Share of directions that are not guided: each bounce multiplies a path's weight by 1/0.2 at most. */
 static const double unguided = 0.2;
 /* Bins learn from their four neighbours by this weight, and from the whole square as if by one direction more. */
 static const double neighbours = 0.2, whole_square = 1;

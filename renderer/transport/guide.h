@@ -1,13 +1,14 @@
 /* Path guiding: the directions from which diffuse surfaces get their indirect light are learned from a pilot
  * render, and paths are sent there more often, with their throughput divided by how much more often. This changes
- * no mean. The pilot has random numbers of its own and is the same for every share of an image, so samples stay
- * independent of each other if the sampler's are.
+ * no mean. The pilot has random numbers of its own and is the same for every share of an image: given the pilot,
+ * samples are as independent as the sampler's numbers.
  *
  * What is learned is a density over the unit square from which a direction's two random numbers come (primary sample
  * space [Guo18]), for each cell of a grid over the scene and each class of normals: the square is cut into 8 x 8
- * bins, each as probable as the root of the mean of L^2 over the directions of the bin asks for, L being what a path
- * gathered after the bounce over its throughput. That is the density with the least variance of its cell. So the
- * density of a direction is that of bsdf_simd.h times that of its bin, and stratified numbers stay stratified.
+ * bins, and the probability of a bin is in proportion to the root of the mean of L^2 over its directions, L being what
+ * a path gathered after the bounce over its throughput: of all densities that are constant in each bin, the one with
+ * the least variance. So the density of a direction is that of bsdf_simd.h times that of its bin, and stratified
+ * numbers stay stratified.
  * Weights of multiple importance sampling use the unguided density on both sides, so they still add up to 1. */
 #ifndef ASSAY_GUIDE_H
 #define ASSAY_GUIDE_H
@@ -19,7 +20,7 @@ enum {
     GUIDE_PATHS = 1 << 18, /* .. and at most so many */
     GUIDE_SIDE = 8,        /* bins along a side of the square */
     GUIDE_CELLS = 8,       /* along each axis of the scene */
-    GUIDE_CLASSES = 12,    /* of normals: largest component, its sign, sign of z (frames change) */
+    GUIDE_CLASSES = 12,    /* of normals: largest component, its sign, sign of z; two never occur */
     GUIDE_PLACES = GUIDE_CELLS * GUIDE_CELLS * GUIDE_CELLS * GUIDE_CLASSES,
     GUIDE_BINS = GUIDE_SIDE * GUIDE_SIDE,
     GUIDE_ROWS = 1 + GUIDE_SIDE, /* of a place's table */

@@ -58,7 +58,7 @@ static __attribute__((noinline)) void guide(const struct integrator *it, struct 
         vi diffuse = lanes_of(mask) & has_bits(vi_load_any(b->bits + k), 1 << MATERIAL_DIFFUSE);
         if (!bits(diffuse))
             continue;
-        /* Elsewhere there may be no surface. */
+        /* In other lanes p may hold anything. */
         vec3v p = v3_select(diffuse, v3_load(&b->p, k), v3_all(it->guide->low));
         vf old[2] = {vf_load_any(b->numbers[0] + k), vf_load_any(b->numbers[1] + k)};
         vf new[2] = {old[0], old[1]};
