@@ -59,7 +59,7 @@ struct small_scene {
 #define FLAT_THIN  12
 /* So much of the reach may the fourth corner of a parallelogram be off, and a wall from its side of the room. */
 #define FLAT_TOLERANCE (8 * FLT_EPSILON)
-#define ROOM_TOLERANCE (2 * FLT_EPSILON)
+#define ROOM_TOLERANCE (4 * FLT_EPSILON)
 
 /* Fills *f with up to WIDE_FLAT primitives of a scene; prim[] must ascend. */
 void small_scene_fill(const struct scene *s, const uint32_t *prim, int num, struct small_scene *f);

@@ -184,7 +184,7 @@ INLINE struct quick_hit quick_face(const struct flat_face *face, const struct qu
     return h;
 }
 
-/* Lanes of points inside the room by more than the margin: one slack where rays begin, of which ROOM_TOLERANCE is an eighth
+/* Lanes of points inside the room by more than the margin: one slack where rays begin, of which ROOM_TOLERANCE is a quarter
  * and the exact test's rounding less than the rest; two where they end, since that is computed; four beside an edge, so
  * that the next wall is met clearly later. */
 INLINE vi in_room(const struct small_scene *f, const vf p[3], vf margin)
