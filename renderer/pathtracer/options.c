@@ -290,11 +290,10 @@ static bool complete(struct options *s, struct err *e)
                        s->cell[1], s->cell[2], s->cell[3], s->width, s->height);
     if ((s->adaptive_batch > 0 || s->pilot_tolerance >= 0 || s->max_error > 0) &&
         s->sampler != SAMPLER_INDEPENDENT)
-        return err_set(
-            e,
-            "--adaptive, --adaptive-unbiased and --error estimate the error from samples that have to be "
-            "independent: not with --sampler %s",
-            sampler_kind_names[s->sampler]);
+        return err_set(e,
+                       "--adaptive, --adaptive-unbiased and --error estimate the error from samples that have to be "
+                       "independent: not with --sampler %s",
+                       sampler_kind_names[s->sampler]);
     if (s->adaptive_batch > 0 && s->pilot_tolerance >= 0)
         return err_set(e, "--adaptive and --adaptive-unbiased exclude each other");
     if (s->pilot_tolerance >= 0 && s->last > 0 && s->spp == 0)

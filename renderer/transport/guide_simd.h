@@ -7,7 +7,7 @@
 
 _Static_assert((int)GUIDE_SIDE == (int)COLUMNS, "a row of a table is one of gather_columns()");
 
-/* Cell and class of surfaces at p with normals n. */
+/* Cell and class of surfaces at p with normals n; of any p and n, NaN too, a place that there is. */
 INLINE vi guide_place(const struct guide *g, vec3v p, vec3v n)
 {
     const vf zero = vf_set(0), most = vf_set(GUIDE_CELLS - 1);

@@ -58,11 +58,9 @@ static __attribute__((noinline)) void guide(const struct integrator *it, struct 
         vi diffuse = lanes_of(mask) & has_bits(vi_load_any(b->bits + k), 1 << MATERIAL_DIFFUSE);
         if (!bits(diffuse))
             continue;
-        /* In other lanes p may hold anything. */
-        vec3v p = v3_select(diffuse, v3_load(&b->p, k), v3_all(it->guide->low));
         vf old[2] = {vf_load_any(b->numbers[0] + k), vf_load_any(b->numbers[1] + k)};
         vf new[2] = {old[0], old[1]};
-        vi bin, place = guide_place(it->guide, p, v3_load(&b->ns, k));
+        vi bin, place = guide_place(it->guide, v3_load(&b->p, k), v3_load(&b->ns, k));
         vf density = vf_select(diffuse, guide_direction(it->guide, place, new, &bin), vf_set(1));
         vf_store_any(b->numbers[0] + k, vf_select(diffuse, new[0], old[0]));
         vf_store_any(b->numbers[1] + k, vf_select(diffuse, new[1], old[1]));
