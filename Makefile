@@ -33,12 +33,11 @@ cflags    = -std=c17 $(OPT) -ffp-contract=off $(WARN_C) -D_XOPEN_SOURCE=700 -pth
 cxxflags  = -std=c++17 -fPIC $(OPT) $(WARN) $(CXXFLAGS) -I. $(shell pkg-config --cflags OpenImageIO | sed 's/-I/-isystem /g')
 
 # Kernels, compiled once for each instruction set (renderer/base/isa.h), e.g. as renderer/bvh/traverse_avx2.c.o.
-# ONE_LANE: also for one lane; SIXTEEN: with sixteen lanes under AVX-512, while the others have eight (of children,
-# triangles or bounds) in any set.
+# ONE_LANE: also for one lane; SIXTEEN: with sixteen lanes under AVX-512, while the others have eight in any set.
 ISAS     := sse42 avx2 avx512
 BY_ISA   := $(addprefix renderer/,bvh/traverse bvh/small_scene_trace bvh/sah_split transport/integrator_simd)
 ONE_LANE := renderer/transport/integrator_simd
-SIXTEEN  := renderer/transport/integrator_simd renderer/bvh/small_scene_trace
+SIXTEEN  := $(addprefix renderer/,bvh/traverse bvh/small_scene_trace transport/integrator_simd)
 isas_of   = $(ISAS) $(if $(filter $(ONE_LANE),$(1)),scalar)
 KERNELS  := $(foreach k,$(BY_ISA),$(patsubst %,$(k)_%.c,$(call isas_of,$(k))))
 MAINS    := renderer/pathtracer/pathtracer.c tools/commands/assay.c

@@ -71,46 +71,47 @@ static bool is_sphere(const struct build *b, uint32_t item)
     return b->item[item].prim >= b->scene->num_triangles;
 }
 
-static void fill_leaf(const struct build *b, const struct wide_item *item, uint32_t count,
-                      struct wide_leaf *l)
+static void set_corner(float *to, uint32_t width, vec3 p)
+{
+    to[0] = p.x;
+    to[width] = p.y;
+    to[2 * width] = p.z;
+}
+
+static void fill_leaf(const struct build *b, const struct empty_leaf *leaf)
 {
     const struct scene *s = b->scene;
-    for (int c = 0; c < 3; c++)
-        for (int a = 0; a < 3; a++)
-            for (int i = 0; i < WIDTH; i++)
-                l->p[c][a][i] = NAN;
-    for (uint32_t i = 0; i < WIDTH; i++)
-        l->prim[i] = NO_HIT;
+    const struct wide_item *item = b->item + leaf->first;
+    const uint32_t width = b->w->width, count = leaf->count;
+    float *corner = (float *)(b->w->arena + leaf->place);
+    uint32_t *number = (uint32_t *)(corner + 9 * (size_t)width);
+    for (uint32_t i = 0; i < 9 * width; i++)
+        corner[i] = NAN;
+    for (uint32_t i = 0; i < width; i++)
+        number[i] = NO_HIT;
     for (uint32_t k = 0; k < count; k++) {
         const uint32_t prim = item[k].prim;
         uint32_t i = 0;
         for (uint32_t j = 0; j < count; j++)
             i += item[j].prim < prim;
-        l->prim[i] = prim;
+        number[i] = prim;
+        float *to = corner + i;
         if (prim >= s->num_triangles) {
             const struct sphere *sp = &s->spheres[prim - s->num_triangles];
-            l->p[0][0][i] = sp->centre.x;
-            l->p[0][1][i] = sp->centre.y;
-            l->p[0][2][i] = sp->centre.z;
-            l->p[1][0][i] = sp->radius;
+            set_corner(to, width, sp->centre);
+            to[3 * width] = sp->radius;
             continue;
         }
-        const vec3 *p = s->position + 3 * (size_t)prim;
-        for (int c = 0; c < 3; c++) {
-            l->p[c][0][i] = p[c].x;
-            l->p[c][1][i] = p[c].y;
-            l->p[c][2][i] = p[c].z;
-        }
+        for (size_t c = 0; c < 3; c++)
+            set_corner(to + 3 * c * width, width, s->position[3 * (size_t)prim + c]);
     }
 }
 
 static void fill_leaves(void *ctx, size_t first, size_t last)
 {
     const struct build *b = ctx;
-    for (size_t i = first; i < last; i++) {
-        const struct empty_leaf *l = &b->leaf[i];
-        fill_leaf(b, b->item + l->first, l->count, (struct wide_leaf *)(b->w->arena + l->place));
-    }
+    for (size_t i = first; i < last; i++)
+        fill_leaf(b, &b->leaf[i]);
 }
 
 /* Appends a leaf, to be filled later. Returns its reference, or WIDE_PLACE if out of memory. */
@@ -125,13 +126,13 @@ static uint32_t add_leaf(struct build *b, const struct wide_range *r)
         b->leaf = larger;
         b->leaf_room = room;
     }
-    if (!reserve(b, sizeof(struct wide_leaf)))
+    if (!reserve(b, WIDE_LEAF_SIZE(w->width)))
         return WIDE_PLACE;
     uint32_t ref = (uint32_t)w->used | WIDE_LEAF;
     if (is_sphere(b, r->first))
         ref |= WIDE_SPHERES;
     b->leaf[w->num_leaves++] = (struct empty_leaf){(uint32_t)w->used, r->first, r->count};
-    w->used += sizeof(struct wide_leaf);
+    w->used += WIDE_LEAF_SIZE(w->width);
     return ref;
 }
 
@@ -145,22 +146,23 @@ static double chance(const struct build *b, const struct wide_box *box)
 static bool add_node(struct build *b, uint32_t i, int depth)
 {
     const struct wide_part *part = b->parts.part;
-    uint32_t child[WIDTH];
+    uint32_t child[WIDE_MOST], ref[WIDE_MOST] = {0};
     int n = wide_build_children(&b->parts, i, child);
     struct wide *w = b->w;
-    if (!reserve(b, sizeof(struct wide_node)))
+    if (!reserve(b, WIDE_NODE_SIZE(w->width)))
         return false;
     size_t place = w->used;
-    w->used += sizeof(struct wide_node);
+    w->used += WIDE_NODE_SIZE(w->width);
     w->num_nodes++;
     if (depth > w->depth)
         w->depth = depth;
     w->cost += chance(b, &part[i].box);
-    struct wide_node node = {.child = {0}};
-    for (int k = 0; k < WIDTH; k++)
-        for (int a = 0; a < 3; a++) {
-            node.plane[2 * a][k] = k < n ? part[child[k]].box.v[a] : INFINITY;
-            node.plane[2 * a + 1][k] = k < n ? -part[child[k]].box.v[4 + a] : -INFINITY;
+    const int width = (int)w->width;
+    float *plane = (float *)(w->arena + place);
+    for (int a = 0; a < 3; a++, plane += 2 * width)
+        for (int k = 0; k < width; k++) {
+            plane[k] = k < n ? part[child[k]].box.v[a] : INFINITY;
+            plane[width + k] = k < n ? -part[child[k]].box.v[4 + a] : -INFINITY;
         }
     /* Leaves are stored right after their node. */
     for (int k = 0; k < n; k++) {
@@ -168,17 +170,17 @@ static bool add_node(struct build *b, uint32_t i, int depth)
         if (c->left != 0)
             continue;
         const struct wide_range r = {.first = c->first, .count = c->count};
-        if ((node.child[k] = add_leaf(b, &r)) == WIDE_PLACE)
+        if ((ref[k] = add_leaf(b, &r)) == WIDE_PLACE)
             return false;
         w->cost += chance(b, &c->box);
     }
     for (int k = 0; k < n; k++)
         if (part[child[k]].left != 0) {
-            node.child[k] = (uint32_t)w->used;
+            ref[k] = (uint32_t)w->used;
             if (!add_node(b, child[k], depth + 1))
                 return false;
         }
-    memcpy(w->arena + place, &node, sizeof node);
+    memcpy(w->arena + place + sizeof *plane * 6 * w->width, ref, sizeof *ref * w->width);
     return true;
 }
 
@@ -196,7 +198,7 @@ static bool add_list(struct build *b, const uint32_t *prim, uint32_t num)
     if ((w->flat = malloc(sizeof *w->flat)) == NULL)
         return false;
     small_scene_fill(b->scene, prim, (int)num, w->flat);
-    w->num_list_leaves = (num + WIDTH - 1) / WIDTH;
+    w->num_list_leaves = (num + w->width - 1) / w->width;
     w->cost = w->num_list_leaves;
     return true;
 }
@@ -272,6 +274,7 @@ struct wide *wide_build(const struct scene *s, enum isa isa, int threads, struct
     if (w == NULL)
         goto fail;
     w->kernel = code[isa].kernel;
+    w->width = b.parts.width = w->kernel->width;
     w->list = code[isa].list;
     w->num_triangles = s->num_triangles;
     b.capacity = 64 * (size_t)all.count + 4096;

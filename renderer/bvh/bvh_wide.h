@@ -1,17 +1,17 @@
-/* A hierarchy of nodes with eight children and leaves of eight primitives, for the kernels of
- * traverse.h. Behind bvh.h: BVH_WIDE. A scene of up to WIDE_FLAT primitives is a list and has no tree;
+/* A hierarchy of nodes with eight children and leaves of eight primitives, sixteen with AVX-512, for the
+ * kernels of traverse.h. Behind bvh.h: BVH_WIDE. A scene of up to WIDE_FLAT primitives is a list and has no tree;
  * the few largest primitives of others, walls say, are a list beside the tree.
  *
  * Which primitive a ray meets does not depend on the way through the tree: the smallest distance
  * wins, and of primitives at the very same distance the smallest number. So a ray finds the same
- * alone, in a packet, and with any instruction set. */
+ * alone, in a packet, and with any instruction set. What differs is how many nodes it visits. */
 #ifndef ASSAY_BVH_WIDE_H
 #define ASSAY_BVH_WIDE_H
 
 #include "bvh.h"
 #include "renderer/base/isa.h"
 
-enum { WIDTH = 8, WIDE_FLAT = 32, WIDE_LINE = 64 };
+enum { WIDE_MOST = 16, WIDE_FLAT = 32, WIDE_LINE = 64 };
 
 /* A reference to a node or leaf: its offset in the arena in bytes, a multiple of 64. The low bits tell what
  * it is: none for a node, WIDE_LEAF, or WIDE_LEAF | WIDE_SPHERES. */
@@ -19,19 +19,14 @@ enum { WIDTH = 8, WIDE_FLAT = 32, WIDE_LINE = 64 };
 #define WIDE_SPHERES 2u
 #define WIDE_PLACE   0xffffffc0u
 
-/* Planes: x low, x high, y low, ...; an empty child has low = infinity, high = -infinity. */
-struct wide_node {
-    float plane[6][WIDTH];
-    uint32_t child[WIDTH];
-    uint32_t unused[WIDTH];
-};
-
-/* p[corner][axis][lane]; of spheres p[0] is the centre and p[1][0] the radius. Empty lanes come last
- * and have prim = NO_HIT and NaNs, which no test lets through. Primitive numbers ascend. */
-struct wide_leaf {
-    float p[3][3][WIDTH];
-    uint32_t prim[WIDTH];
-};
+/* Nodes and leaves are rows of `width` floats or uint32_t.
+ * A node, in whole lines of the cache: six rows of planes (x low, x high, y low, ...) and one of references to the
+ * children. An empty child has low = infinity, high = -infinity.
+ * A leaf: nine rows of corners (x, y and z of the first ones, of the second, of the third) and one of primitive
+ * numbers, which ascend; of spheres the first three rows are the centres, the fourth the radii. Empty lanes come last
+ * and have NO_HIT and NaNs, which no test lets through. */
+#define WIDE_NODE_SIZE(width) (((size_t)(width)*7 * 4 + WIDE_LINE - 1) / WIDE_LINE * WIDE_LINE)
+#define WIDE_LEAF_SIZE(width) ((size_t)(width)*10 * 4)
 
 struct traverse;
 struct small_scene;
@@ -43,6 +38,7 @@ struct wide {
     size_t used;              /* bytes */
     const struct traverse *kernel;
     const struct small_scene_trace *list; /* the list's kernel */
+    uint32_t width;                       /* kernel->width: eight, or WIDE_MOST */
     float min[3], max[3];                 /* of the scene */
     float tree_min[3], tree_max[3];       /* of what is in the tree */
     uint32_t num_list_leaves;             /* leaf tests that the list counts as */

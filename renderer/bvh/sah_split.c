@@ -1,8 +1,8 @@
 #include "sah_split.h"
-#include "bvh_wide.h"
 #include "renderer/math/simd.h"
 
 #include <float.h>
+#include <stdbool.h>
 
 /* Exchanges the halves: minimum and negated maximum, or a sum and its negative. */
 INLINE vf swap_halves(vf a)
@@ -34,9 +34,11 @@ static void bounds(const struct wide_item *item, uint32_t n, struct wide_box *bo
     vf_store(centres->v, c);
 }
 
-static void split(const struct wide_item *item, uint32_t n, const struct wide_box *centres,
-                  struct wide_split *out)
+static void split(const struct wide_item *item, uint32_t n, uint32_t width,
+                  const struct wide_box *centres, struct wide_split *out)
 {
+    const uint32_t most = width - 1;
+    const int log_width = __builtin_ctz(width);
     const int bins = n < 512 ? 16 : WIDE_MAX_BINS;
     vf low = vf_load(centres->v), extent = -(low + swap_halves(low)), to_bins = vf_set(0);
     bool usable[3];
@@ -77,7 +79,7 @@ static void split(const struct wide_item *item, uint32_t n, const struct wide_bo
             sweep = vf_min(box[a][k], sweep);
             m += count[a][k];
             right[k] = sweep;
-            cost[k] = m == 0 ? FLT_MAX : half_area(sweep) * (float)((m + WIDTH - 1) / WIDTH);
+            cost[k] = m == 0 ? FLT_MAX : half_area(sweep) * (float)((m + most) >> log_width);
         }
         sweep = vf_set(FLT_MAX);
         m = 0;
@@ -86,7 +88,7 @@ static void split(const struct wide_item *item, uint32_t n, const struct wide_bo
             m += count[a][k - 1];
             if (m == 0)
                 continue;
-            float total = cost[k] + half_area(sweep) * (float)((m + WIDTH - 1) / WIDTH);
+            float total = cost[k] + half_area(sweep) * (float)((m + most) >> log_width);
             if (total < out->cost) {
                 out->cost = total;
                 out->axis = a;

@@ -29,10 +29,10 @@ struct wide_split {
 };
 
 struct sah_split_passes {
-    /* Finds the best cut by the surface area heuristic, a leaf of up to eight costing one. centres:
-     * box of the doubled centres. */
-    void (*split)(const struct wide_item *item, uint32_t n, const struct wide_box *centres,
-                  struct wide_split *out);
+    /* Finds the best cut by the surface area heuristic, a leaf of up to `width` items, a power of two, costing one.
+     * centres: box of the doubled centres. */
+    void (*split)(const struct wide_item *item, uint32_t n, uint32_t width,
+                  const struct wide_box *centres, struct wide_split *out);
     /* Returns how many went left; *left, *right: boxes of the doubled centres of both sides. */
     uint32_t (*partition)(struct wide_item *item, uint32_t n, const struct wide_split *s,
                           struct wide_box *left, struct wide_box *right);

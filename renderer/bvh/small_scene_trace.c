@@ -2,11 +2,11 @@
 #include "small_scene_hit.h"
 #include "traverse.h"
 
-/* Counts in groups of WIDTH rays, so that the count does not depend on LANES. */
+/* As many rays as the list has lanes count as one. */
 static void count(const struct wide *w, int num_lanes, struct bvh_stats *stats)
 {
     stats->primitive_tests +=
-        (uint64_t)w->num_list_leaves * (((uint64_t)num_lanes + WIDTH - 1) / WIDTH);
+        (uint64_t)w->num_list_leaves * (((uint64_t)num_lanes + LANES - 1) / LANES);
 }
 
 /* Appends to left[], which has num entries, the lanes of the mask that meet the tree's box. Returns the new number. */

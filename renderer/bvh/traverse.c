@@ -9,17 +9,17 @@ INLINE void trace(const struct wide *w, const struct rays *r, const uint16_t *la
                   struct hits *h, bool *occluded, struct bvh_stats *stats)
 {
     const bool any = h == NULL;
-    struct rayv octet, *o = &octet;
+    struct rayv together, *o = &together;
     for (int k = 0; k < num_lanes; k += LANES) {
         uint16_t filled[LANES];
-        const uint16_t *eight = rayv_from(lane, k, num_lanes, filled);
+        const uint16_t *of = rayv_from(lane, k, num_lanes, filled);
         unsigned open = lanes_there(k, num_lanes);
         const bool full = open == ALL_LANES;
-        rayv_init(r, eight, o);
+        rayv_init(r, of, o);
         if (any)
-            rayv_ignore(r, eight, o);
+            rayv_ignore(r, of, o);
         else if (w->flat != NULL)
-            rayv_go_on(h, eight, o);
+            rayv_go_on(h, of, o);
         rayv_slabs(w, o);
         if (full && are_alike(w, o)) {
             struct packet p;
@@ -28,9 +28,9 @@ INLINE void trace(const struct wide *w, const struct rays *r, const uint16_t *la
             bundle_init(w, o, &b);
             packet_traverse(w, &b, &p, any, stats);
             if (any)
-                packet_verdict(&p, eight, occluded);
+                packet_verdict(&p, of, occluded);
             else
-                packet_result(&p, eight, h);
+                packet_result(&p, of, h);
             continue;
         }
         struct single single[LANES];
@@ -43,7 +43,7 @@ INLINE void trace(const struct wide *w, const struct rays *r, const uint16_t *la
             single_in_turns(w, single, n, any, stats);
         for (int j = 0; j < n; j++) {
             struct single *s = &single[j];
-            int i = eight[s->lane];
+            int i = of[s->lane];
             if (!w->in_turns)
                 single_alone(w, s, any, stats);
             if (any) {
@@ -83,4 +83,5 @@ static void occluded(const struct wide *w, const struct rays *r, const uint16_t 
     trace(w, r, lane, num_lanes, NULL, occluded, stats);
 }
 
-const struct traverse FOR_ISA(traverse) = {.closest = closest, .occluded = occluded};
+const struct traverse FOR_ISA(traverse) = {
+    .width = LANES, .closest = closest, .occluded = occluded};

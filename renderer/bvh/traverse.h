@@ -5,8 +5,9 @@
 
 #include "bvh_wide.h"
 
-/* As bvh_closest() and bvh_occluded(). */
+/* As bvh_closest() and bvh_occluded(), over nodes and leaves of `width`, which are tested at once. */
 struct traverse {
+    uint32_t width;
     void (*closest)(const struct wide *w, const struct rays *r, const uint16_t *lane, int num_lanes,
                     struct hits *h, struct bvh_stats *stats);
     void (*occluded)(const struct wide *w, const struct rays *r, const uint16_t *lane,

@@ -1,4 +1,4 @@
-/* Packet traversal: eight rays that are alike go through the tree as one bundle; in a leaf, primitives
+/* Packet traversal: LANES rays that are alike go through the tree as one bundle; in a leaf, primitives
  * are tested one by one against all of them. Part of traverse.c. */
 #ifndef ASSAY_TRAVERSE_PACKET_H
 #define ASSAY_TRAVERSE_PACKET_H
@@ -7,7 +7,7 @@
 #include "ray_simd.h"
 #include "traverse_stack.h"
 
-/* Eight rays with the same axes of the shear, a ray to a lane, and what they have found. */
+/* LANES rays with the same axes of the shear, a ray to a lane, and what they have found. */
 struct packet {
     const struct rayv *q;
     int k[3];
@@ -33,7 +33,7 @@ INLINE bool packet_leaf(const struct wide_leaf *l, struct packet *p, bool sphere
 {
     const struct rayv *q = p->q;
     vi changed = vi_set(0);
-    for (int j = 0; j < WIDTH && l->prim[j] != NO_HIT; j++) {
+    for (int j = 0; j < LANES && l->prim[j] != NO_HIT; j++) {
         vf t, u, v;
         vi hit;
         if (spheres) {
@@ -72,17 +72,9 @@ INLINE bool packet_leaf(const struct wide_leaf *l, struct packet *p, bool sphere
     return bits(changed) != 0;
 }
 
-INLINE float smallest(vf a)
-{
-    a = vf_min(a, __builtin_shufflevector(a, a, 4, 5, 6, 7, 0, 1, 2, 3));
-    a = vf_min(a, __builtin_shufflevector(a, a, 2, 3, 0, 1, 6, 7, 4, 5));
-    a = vf_min(a, __builtin_shufflevector(a, a, 1, 0, 3, 2, 5, 4, 7, 6));
-    return a[0];
-}
-
 INLINE float largest(vf a)
 {
-    return -smallest(-a);
+    return -vf_least(-a);
 }
 
 /* All rays of a packet as one: intervals of origins and of inverse directions, all of one sign. */
@@ -98,12 +90,12 @@ INLINE bool are_alike(const struct wide *w, const struct rayv *q)
     vi alike = vi_eq(q->axis, vi_set(q->axis[0]));
     for (int a = 0; a < 3; a++) {
         unsigned negative = bits((vi)q->inv[a]);
-        if (negative != 0 && negative != 255)
+        if (negative != 0 && negative != ALL_LANES)
             return false;
         alike &= vf_lt(vf_abs(q->d[a] - q->d[a][0]), vf_set(0.1f));
         alike &= vf_le(vf_abs(q->o[a] - q->o[a][0]), vf_set(w->alike));
     }
-    return bits(alike) == 255;
+    return bits(alike) == ALL_LANES;
 }
 
 static void bundle_init(const struct wide *w, const struct rayv *q, struct bundle *b)
@@ -111,14 +103,14 @@ static void bundle_init(const struct wide *w, const struct rayv *q, struct bundl
     float grow = largest(growth(w, q));
     for (int a = 0; a < 3; a++) {
         bool negative = q->inv[a][0] < 0;
-        float low = smallest(q->o[a]) - grow, high = largest(q->o[a]) + grow;
-        b->inv[a][0] = vf_set(smallest(q->inv[a]));
+        float low = vf_least(q->o[a]) - grow, high = largest(q->o[a]) + grow;
+        b->inv[a][0] = vf_set(vf_least(q->inv[a]));
         b->inv[a][1] = vf_set(largest(q->inv[a]));
         b->enter[a] = vf_set(negative ? low : high);
         b->leave[a] = vf_set(negative ? high : low);
         b->row[a] = 2 * a + negative;
     }
-    b->tmin = vf_set(smallest(q->tmin));
+    b->tmin = vf_set(vf_least(q->tmin));
 }
 
 /* Mask of the children that some ray of the bundle may meet; *enter: lower bounds of the entries. */

@@ -1,5 +1,5 @@
-/* Single-ray traversal: one ray against eight boxes of a node, then against eight primitives of a leaf at a
- * time. Part of traverse.c. */
+/* Single-ray traversal: one ray against the boxes of a node, LANES at a time, then against the primitives of a
+ * leaf. Part of traverse.c. */
 #ifndef ASSAY_TRAVERSE_SINGLE_H
 #define ASSAY_TRAVERSE_SINGLE_H
 
@@ -124,7 +124,7 @@ INLINE unsigned single_node(const struct wide_node *n, const struct slabs *b, vf
     return bits(vf_le(*enter, vf_min(vf_min(x1, y1), vf_min(z1, limit))));
 }
 
-/* Tests the children of the root. Done for all eight rays before any of them goes on, so that none
+/* Tests the children of the root. Done for LANES rays before any of them goes on, so that none
  * waits for another. */
 INLINE void single_root(const struct wide *w, struct single *s)
 {
@@ -234,7 +234,7 @@ INLINE bool way_step(const struct wide *w, struct way *on, bool any, uint64_t *n
     return true;
 }
 
-/* The same for up to eight rays, one step each in turn: while one waits for memory the others go on. */
+/* The same for up to LANES rays, one step each in turn: while one waits for memory the others go on. */
 static __attribute__((noinline)) void single_in_turns(const struct wide *w, struct single *s, int n,
                                                       bool any, struct bvh_stats *stats)
 {

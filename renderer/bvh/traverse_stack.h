@@ -6,8 +6,23 @@
 #include "bvh_wide.h"
 #include "renderer/math/simd.h"
 
-/* A node pushes at most seven of its children; 64 free levels, 32 of halving and some to spare. */
-enum { STACK = 7 * 104 };
+/* Rows of LANES, laid out as bvh_wide.h says. */
+struct wide_node {
+    float plane[6][LANES];
+    uint32_t child[LANES];
+} __attribute__((aligned(WIDE_LINE)));
+
+struct wide_leaf {
+    float p[3][3][LANES]; /* corner, axis */
+    uint32_t prim[LANES];
+};
+
+_Static_assert(sizeof(struct wide_node) == WIDE_NODE_SIZE(LANES) &&
+                   sizeof(struct wide_leaf) == WIDE_LEAF_SIZE(LANES),
+               "as the builder lays them out");
+
+/* A node pushes all but one of its children; 64 free levels, 32 of halving and some to spare. */
+enum { STACK = (LANES - 1) * 104 };
 
 /* A waiting node or leaf: the bits of the distance at which a ray enters it, and its reference. As
  * integers they sort by distance where that is positive; elsewhere only the order of visits
@@ -22,12 +37,8 @@ static inline const void *at(const struct wide *w, uint32_t ref)
 INLINE void fetch_ahead(const struct wide *w, uint32_t ref, bool ahead)
 {
     const char *p = at(w, ref);
-    if (!ahead)
-        return;
-    __builtin_prefetch(p);
-    __builtin_prefetch(p + 64);
-    __builtin_prefetch(p + 128);
-    __builtin_prefetch(p + 192);
+    for (size_t k = 0; ahead && k < sizeof(struct wide_node); k += WIDE_LINE)
+        __builtin_prefetch(p + k);
 }
 
 INLINE stacked stack_entry(float t, uint32_t ref)
@@ -62,7 +73,7 @@ INLINE void order(stacked *near, stacked *far)
 INLINE uint32_t push_sorted(const struct wide *w, const struct wide_node *n, unsigned hit, vf enter,
                             bool ahead, stacked **top)
 {
-    float t[LANES] __attribute__((aligned(32)));
+    float t[LANES] __attribute__((aligned(64)));
     vf_store(t, enter);
     int i = __builtin_ctz(hit);
     hit &= hit - 1;

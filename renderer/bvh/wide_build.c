@@ -22,10 +22,10 @@ static bool is_sphere(const struct build *b, uint32_t item)
     return b->item[item].prim >= b->num_triangles;
 }
 
-/* A leaf has up to WIDTH triangles or up to WIDTH spheres. */
+/* A leaf has up to `width` triangles or as many spheres. */
 static bool fits_leaf(const struct build *b, const struct wide_range *r)
 {
-    if (r->count > WIDTH)
+    if (r->count > b->parts->width)
         return false;
     for (uint32_t i = 1; i < r->count; i++)
         if (is_sphere(b, r->first + i) != is_sphere(b, r->first))
@@ -53,15 +53,16 @@ static void cut(struct build *b, struct wide_range *r, struct wide_range *right)
     struct wide_split s = {.cost = FLT_MAX};
     struct wide_range l = {.first = r->first, .depth = r->depth + 1};
     *right = (struct wide_range){.depth = r->depth + 1};
-    if (r->count > WIDTH && r->depth < MAX_FREE_DEPTH)
-        k->split(item, r->count, &r->centres, &s);
+    const uint32_t width = b->parts->width;
+    if (r->count > width && r->depth < MAX_FREE_DEPTH)
+        k->split(item, r->count, width, &r->centres, &s);
     if (s.cost < FLT_MAX) {
         l.count = k->partition(item, r->count, &s, &l.centres, &right->centres);
         l.box = s.left;
         right->box = s.right;
     } else {
-        /* Eight or fewer of both kinds; or coincident centres, or a tree grown too deep. */
-        l.count = r->count <= WIDTH ? spheres_last(b, r) : r->count / 2;
+        /* A leaf's worth of both kinds; or coincident centres, or a tree grown too deep. */
+        l.count = r->count <= width ? spheres_last(b, r) : r->count / 2;
         k->bounds(item, l.count, &l.box, &l.centres);
         k->bounds(item + l.count, r->count - l.count, &right->box, &right->centres);
     }
@@ -93,17 +94,18 @@ static size_t most_parts(uint32_t items)
     return items / 3 + 2;
 }
 
-/* Fills part i's table of the best uses of 1 to 8 child slots, from those of its halves [Ylitie17]. */
+/* Fills part i's table of the best uses of 1 to `width` child slots, from those of its halves [Ylitie17]. */
 static void best_slots(struct build *b, uint32_t i)
 {
     struct wide_part *p = &b->parts->part[i];
     const struct wide_part *l = &b->parts->part[p->left], *r = l + 1;
-    float split[WIDTH + 1];
-    uint8_t left[WIDTH + 1];
-    for (int n = 2; n <= WIDTH; n++) {
+    const uint32_t width = b->parts->width;
+    float split[WIDE_MOST + 1];
+    uint8_t left[WIDE_MOST + 1];
+    for (uint32_t n = 2; n <= width; n++) {
         split[n] = INFINITY;
         left[n] = 1; /* costs that are infinite or not numbers are as good as each other */
-        for (int k = 1; k < n; k++) {
+        for (uint32_t k = 1; k < n; k++) {
             float c = l->cost[k - 1] + r->cost[n - k - 1];
             if (c < split[n]) {
                 split[n] = c;
@@ -111,9 +113,9 @@ static void best_slots(struct build *b, uint32_t i)
             }
         }
     }
-    p->cost[0] = wide_half_area(&p->box) + split[WIDTH];
-    p->left_slots[0] = left[WIDTH];
-    for (int n = 2; n <= WIDTH; n++) {
+    p->cost[0] = wide_half_area(&p->box) + split[width];
+    p->left_slots[0] = left[width];
+    for (uint32_t n = 2; n <= width; n++) {
         bool better = split[n] < p->cost[n - 2];
         bool inherit = !better && n > 2;
         p->cost[n - 1] = better ? split[n] : p->cost[n - 2];
@@ -126,7 +128,7 @@ static bool add_part(struct build *b, uint32_t i, struct wide_range *r)
 {
     b->parts->part[i] = (struct wide_part){.box = r->box, .first = r->first, .count = r->count};
     if (fits_leaf(b, r)) {
-        for (int k = 0; k < WIDTH; k++)
+        for (uint32_t k = 0; k < b->parts->width; k++)
             b->parts->part[i].cost[k] = wide_half_area(&r->box);
         return true;
     }
@@ -206,7 +208,7 @@ static int grow_range(void *ctx, const struct parallel_task *task, struct parall
     struct grove_task t;
     memcpy(&t, task->what, sizeof t);
     if (t.range.count <= g->most) {
-        struct branch n = {.at = t.at};
+        struct branch n = {.at = t.at, .parts.width = g->b->parts->width};
         struct build b = *g->b;
         b.parts = &n.parts;
         bool ok = reserve(&n.parts, most_parts(t.range.count));
@@ -292,13 +294,13 @@ bool wide_build_make(const struct sah_split_passes *s, struct wide_item *item,
     return on_threads ? grow_on_threads(&b, all, threads) : add_part(&b, 0, &r);
 }
 
-int wide_build_children(const struct wide_build *p, uint32_t i, uint32_t child[WIDTH])
+int wide_build_children(const struct wide_build *p, uint32_t i, uint32_t child[WIDE_MOST])
 {
     uint32_t left = p->part[i].left;
     int slots = p->part[i].left_slots[0];
     assert(left != 0);
     int n = gather_children(p, left, slots, child, 0);
-    return gather_children(p, left + 1, WIDTH - slots, child, n);
+    return gather_children(p, left + 1, (int)p->width - slots, child, n);
 }
 
 void wide_build_free(struct wide_build *p)

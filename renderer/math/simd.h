@@ -8,6 +8,7 @@
  *   vi_numbers              0, 1, 2, ...
  *   vi_divide               quotients of numbers from 0 to 2^31 - 1 by one int
  *   vf_min, vf_max          as minf and maxf: if either is NaN the second wins
+ *   vf_least                the smallest of all lanes, without NaNs; not of one lane
  *   vf_hypot                sqrt(a a + b b), computed in double
  *   vf_lt, vf_le, vf_eq, vi_lt, vi_eq, vf_select
  *   bits, lanes_of          a mask as an integer, bit k for lane k; and back
@@ -47,6 +48,15 @@ typedef uint32_t vu __attribute__((vector_size(4 * LANES)));
 /* Lane i, to read or to write. */
 #define LANE(v, i) ((v)[i])
 
+/* p aligned as a vector. */
+INLINE vf vf_load(const float *p)
+{
+    return *(const vf *)p;
+}
+INLINE void vf_store(float *p, vf a)
+{
+    *(vf *)p = a;
+}
 INLINE vf vf_of_int(vi a)
 {
     return __builtin_convertvector(a, vf);

@@ -14,15 +14,6 @@ INLINE vi vi_set(int32_t x)
 {
     return (vi){x, x, x, x, x, x, x, x};
 }
-/* p aligned to 32 bytes. */
-INLINE vf vf_load(const float *p)
-{
-    return *(const vf *)p;
-}
-INLINE void vf_store(float *p, vf a)
-{
-    *(vf *)p = a;
-}
 INLINE vi vi_numbers(void)
 {
     return (vi){0, 1, 2, 3, 4, 5, 6, 7};
@@ -243,6 +234,13 @@ INLINE unsigned spread_flags(const void *flags, unsigned mask)
 }
 #endif
 
+INLINE float vf_least(vf a)
+{
+    a = vf_min(a, __builtin_shufflevector(a, a, 4, 5, 6, 7, 0, 1, 2, 3));
+    a = vf_min(a, __builtin_shufflevector(a, a, 2, 3, 0, 1, 6, 7, 4, 5));
+    a = vf_min(a, __builtin_shufflevector(a, a, 1, 0, 3, 2, 5, 4, 7, 6));
+    return a[0];
+}
 INLINE vi lanes_of(unsigned mask)
 {
     const vi bit = {1, 2, 4, 8, 16, 32, 64, 128};

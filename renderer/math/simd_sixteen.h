@@ -33,6 +33,10 @@ INLINE vf vf_max(vf a, vf b)
 {
     return (vf)_mm512_max_ps((__m512)a, (__m512)b);
 }
+INLINE float vf_least(vf a)
+{
+    return _mm512_reduce_min_ps((__m512)a);
+}
 INLINE vf vf_sqrt(vf a)
 {
     return (vf)_mm512_sqrt_ps((__m512)a);
