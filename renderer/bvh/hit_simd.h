@@ -18,13 +18,13 @@ static __attribute__((noinline, cold)) void edge_exact(const vf *ax, const vf *a
 
 /* triangle_intersect() without the comparison of t; returns the lanes that pass. x, y, z: the corners
  * in the sheared frame, whose origin is that of the ray; sz: as in struct shear. */
-INLINE vi sheared_hit(const vf x[3], const vf y[3], const vf z[3], vf sz, vf *t, vf *u, vf *v)
+INLINE vm sheared_hit(const vf x[3], const vf y[3], const vf z[3], vf sz, vf *t, vf *u, vf *v)
 {
     vf e0 = x[1] * y[2] - y[1] * x[2];
     vf e1 = x[2] * y[0] - y[2] * x[0];
     vf e2 = x[0] * y[1] - y[0] * x[1];
     const vf zero = vf_set(0);
-    vi pass = ~(vf_lt(vf_min(vf_min(e0, e1), e2), zero) & vf_lt(zero, vf_max(vf_max(e0, e1), e2)));
+    vm pass = ~(vf_lt(vf_min(vf_min(e0, e1), e2), zero) & vf_lt(zero, vf_max(vf_max(e0, e1), e2)));
     if (!bits(pass))
         return pass;
     if (__builtin_expect(bits(pass & (vf_eq(e0, zero) | vf_eq(e1, zero) | vf_eq(e2, zero))) != 0,
@@ -43,13 +43,13 @@ INLINE vi sheared_hit(const vf x[3], const vf y[3], const vf z[3], vf sz, vf *t,
 }
 
 /* sphere_intersect() within (tmin, limit]. f: from the centre to the ray's origin. */
-INLINE vi sphere_hit(vf fx, vf fy, vf fz, vf dx, vf dy, vf dz, vf radius, vf tmin, vf limit, vf *t)
+INLINE vm sphere_hit(vf fx, vf fy, vf fz, vf dx, vf dy, vf dz, vf radius, vf tmin, vf limit, vf *t)
 {
     vf b = -(fx * dx + fy * dy + fz * dz);
     vf cx = fx + b * dx, cy = fy + b * dy, cz = fz + b * dz;
     vf disc = radius * radius - (cx * cx + cy * cy + cz * cz);
     const vf zero = vf_set(0);
-    vi pass = vf_le(zero, disc);
+    vm pass = vf_le(zero, disc);
     if (!bits(pass))
         return pass;
     vf c = fx * fx + fy * fy + fz * fz - radius * radius;
@@ -57,8 +57,8 @@ INLINE vi sphere_hit(vf fx, vf fy, vf fz, vf dx, vf dy, vf dz, vf radius, vf tmi
     vf q = b + (vf)((vi)root | ((vi)b & vi_set(INT32_MIN)));
     vf t0 = vf_select(vf_eq(q, zero), zero, c / q), t1 = q;
     vf near = vf_min(t0, t1), far = vf_max(t0, t1);
-    vi first = vf_lt(tmin, near) & vf_le(near, limit);
-    vi second = vf_lt(tmin, far) & vf_le(far, limit);
+    vm first = vf_lt(tmin, near) & vf_le(near, limit);
+    vm second = vf_lt(tmin, far) & vf_le(far, limit);
     *t = vf_select(first, near, far);
     return pass & (first | second);
 }

@@ -38,7 +38,7 @@ INLINE vf gather(const void *a, const uint16_t *lane, bool in_row)
 INLINE void rayv_shear(struct rayv *q)
 {
     vf x = vf_abs(q->d[0]), y = vf_abs(q->d[1]), z = vf_abs(q->d[2]);
-    vi is_x = vf_lt(y, x) & vf_lt(z, x), is_y = ~is_x & vf_lt(z, y);
+    vm is_x = vf_lt(y, x) & vf_lt(z, x), is_y = ~is_x & vf_lt(z, y);
     q->axis = vi_select(is_x, vi_set(0), vi_select(is_y, vi_set(1), vi_set(2)));
     q->sz = 1 / vf_select(is_x, q->d[0], vf_select(is_y, q->d[1], q->d[2]));
     q->sx = vf_select(is_x, q->d[1], vf_select(is_y, q->d[2], q->d[0])) * q->sz;
@@ -81,7 +81,7 @@ INLINE void rayv_store(const struct rayv *q, const uint16_t lane[LANES], vf t, v
     }
 }
 
-INLINE void rayv_store_flags(const struct rayv *q, const uint16_t lane[LANES], vi mask, bool *flag)
+INLINE void rayv_store_flags(const struct rayv *q, const uint16_t lane[LANES], vm mask, bool *flag)
 {
     bool flags[LANES];
     store_flags(flags, mask);
@@ -96,8 +96,9 @@ INLINE void rayv_init(const struct rays *r, const uint16_t lane[LANES], struct r
 {
     rayv_load(r, lane, q);
     vi tmax = (vi)q->tmax;
-    vi zero = vf_eq((vf)tmax, vf_set(0));
-    q->limit = (vf)vi_select(zero, vi_set(INT32_MIN + 1), tmax + 1 + 2 * vi_lt(vi_set(-1), tmax));
+    vm zero = vf_eq((vf)tmax, vf_set(0));
+    q->limit = (vf)vi_select(zero, vi_set(INT32_MIN + 1),
+                             tmax + vi_select(vi_lt(vi_set(-1), tmax), vi_set(-1), vi_set(1)));
     rayv_shear(q);
     q->u = q->v = vf_set(0);
     q->prim = vi_set(NOTHING);
@@ -106,7 +107,8 @@ INLINE void rayv_init(const struct rays *r, const uint16_t lane[LANES], struct r
 /* Takes over the hits so far from *h. */
 INLINE void rayv_go_on(const struct hits *h, const uint16_t lane[LANES], struct rayv *q)
 {
-    vi prim = (vi)gather(h->prim, lane, q->in_row), met = vi_lt(vi_set(-1), prim);
+    vi prim = (vi)gather(h->prim, lane, q->in_row);
+    vm met = vi_lt(vi_set(-1), prim);
     q->limit = vf_select(met, gather(h->t, lane, q->in_row), q->limit);
     q->prim = vi_select(met, prim, q->prim);
     q->u = gather(h->u, lane, q->in_row);
@@ -163,7 +165,7 @@ INLINE unsigned rayv_box(const struct wide *w, const struct rayv *q)
 {
     vf begin = q->tmin, end = q->limit;
     for (int a = 0; a < 3; a++) {
-        vi backwards = vf_lt(q->inv[a], vf_set(0));
+        vm backwards = vf_lt(q->inv[a], vf_set(0));
         vf low = vf_set(w->tree_min[a]), high = vf_set(w->tree_max[a]);
         begin = vf_max(begin, mul_sub(vf_select(backwards, high, low), q->inv[a], q->enter[a]));
         end = vf_min(end, mul_sub(vf_select(backwards, low, high), q->inv[a], q->leave[a]));

@@ -14,7 +14,7 @@ struct list {
 
 INLINE void list_init(const struct small_scene *f, const struct rayv *q, struct list *l)
 {
-    const vi is_x = vi_eq(q->axis, vi_set(0)), is_y = vi_eq(q->axis, vi_set(1));
+    const vm is_x = vi_eq(q->axis, vi_set(0)), is_y = vi_eq(q->axis, vi_set(1));
     for (int i = 0; i < f->num_corners; i++) {
         vf x = f->corner[i][0] - q->o[0], y = f->corner[i][1] - q->o[1];
         vf z = f->corner[i][2] - q->o[2];
@@ -24,7 +24,7 @@ INLINE void list_init(const struct small_scene *f, const struct rayv *q, struct 
         l->y[i] = vf_select(is_x, z, vf_select(is_y, x, y)) - q->sy * along;
     }
     const vf zero = vf_set(0);
-    vi touched = vi_set(0);
+    vm touched = vm_set(false);
     for (int i = 0; i < f->num_edges; i++) {
         const int a = f->edge[i][0], b = f->edge[i][1];
         vf e = l->x[a] * l->y[b] - l->y[a] * l->x[b];
@@ -43,13 +43,13 @@ INLINE void list_init(const struct small_scene *f, const struct rayv *q, struct 
 
 /* Tests triangle i against all rays like sheared_hit(); returns the lanes that meet it inside (tmin, limit).
  * Branch-free: of eight or more rays one is almost always inside, and when none is cannot be predicted. */
-INLINE vi list_triangle(const struct small_scene *f, const struct list *l, int i,
+INLINE vm list_triangle(const struct small_scene *f, const struct list *l, int i,
                         const struct rayv *q, vf limit, vf *t, vf *u, vf *v)
 {
     const uint8_t *c = f->triangle[i].corner, *e = f->triangle[i].edge;
     const vf *edge = l->edge[0], zero = vf_set(0);
     vf e0 = edge[e[0]], e1 = edge[e[1]], e2 = edge[e[2]];
-    vi pass = ~(vf_lt(vf_min(vf_min(e0, e1), e2), zero) & vf_lt(zero, vf_max(vf_max(e0, e1), e2)));
+    vm pass = ~(vf_lt(vf_min(vf_min(e0, e1), e2), zero) & vf_lt(zero, vf_max(vf_max(e0, e1), e2)));
     vf inv = 1 / (e0 + e1 + e2);
     *u = e1 * inv;
     *v = e2 * inv;
@@ -60,11 +60,11 @@ INLINE vi list_triangle(const struct small_scene *f, const struct list *l, int i
 /* The largest float below a. */
 INLINE vf below(vf a)
 {
-    vi b = (vi)a, zero = vf_eq(a, vf_set(0));
-    return (vf)vi_select(zero, vi_set(INT32_MIN + 1), b + 1 + 2 * vi_lt(vi_set(-1), b));
+    vi b = (vi)a, one = vi_select(vi_lt(vi_set(-1), b), vi_set(-1), vi_set(1));
+    return (vf)vi_select(vf_eq(a, vf_set(0)), vi_set(INT32_MIN + 1), b + one);
 }
 
-INLINE vi list_sphere(const struct small_scene *f, int i, const struct rayv *q, vf limit, vf *t)
+INLINE vm list_sphere(const struct small_scene *f, int i, const struct rayv *q, vf limit, vf *t)
 {
     const float *s = f->sphere[i];
     return sphere_hit(q->o[0] - s[0], q->o[1] - s[1], q->o[2] - s[2], q->d[0], q->d[1], q->d[2],
@@ -85,14 +85,14 @@ list_closest_exact(const struct small_scene *f, const struct rayv *q, struct lis
     list_init(f, q, &l);
     *best = (struct list_hits){q->tmax, vf_set(0), vf_set(0), vi_set(-1)};
     for (int i = 0; i < f->num_triangles; i++) {
-        vi hit = list_triangle(f, &l, i, q, best->t, &t, &u, &v);
+        vm hit = list_triangle(f, &l, i, q, best->t, &t, &u, &v);
         best->t = vf_select(hit, t, best->t);
         best->u = vf_select(hit, u, best->u);
         best->v = vf_select(hit, v, best->v);
         best->prim = vi_select(hit, vi_set(i), best->prim);
     }
     for (int i = 0; i < f->num_spheres; i++) {
-        vi hit = list_sphere(f, i, q, best->t, &t);
+        vm hit = list_sphere(f, i, q, best->t, &t);
         best->t = vf_select(hit, t, best->t);
         best->u = vf_select(hit, vf_set(0), best->u);
         best->v = vf_select(hit, vf_set(0), best->v);
@@ -100,17 +100,17 @@ list_closest_exact(const struct small_scene *f, const struct rayv *q, struct lis
     }
 }
 
-INLINE vi does_not_ignore(const struct small_scene *f, int i, const struct rayv *q)
+INLINE vm does_not_ignore(const struct small_scene *f, int i, const struct rayv *q)
 {
     return ~vi_eq(q->ignore, vi_set(f->number[i]));
 }
 
-static __attribute__((noinline)) vi list_occluded_exact(const struct small_scene *f,
+static __attribute__((noinline)) vm list_occluded_exact(const struct small_scene *f,
                                                         const struct rayv *q)
 {
     struct list l;
     vf t, u, v;
-    vi met = vi_set(0);
+    vm met = vm_set(false);
     list_init(f, q, &l);
     for (int i = 0; i < f->num_triangles; i++)
         met |= list_triangle(f, &l, i, q, q->tmax, &t, &u, &v) & does_not_ignore(f, i, q);
@@ -123,7 +123,7 @@ static __attribute__((noinline)) vi list_occluded_exact(const struct small_scene
 struct quick {
     vf error, slack; /* FLAT_ERROR m^2, FLAT_SLACK m */
     vf end;          /* where the ray ends, or has left the scene */
-    vi fit;
+    vm fit;
 };
 
 INLINE struct quick quick_init(const struct small_scene *f, const struct rayv *q)
@@ -156,7 +156,7 @@ INLINE struct quick_plane quick_plane(const struct flat_face *face, const struct
 
 /* Lanes whose rays begin and end on the same side of the plane, too far from it for rounding to matter; at
  * the end twice as far, since k->end can be four times m. */
-INLINE vi quick_clear(const struct flat_face *face, const struct quick_plane *p,
+INLINE vm quick_clear(const struct flat_face *face, const struct quick_plane *p,
                       const struct quick *k)
 {
     vf end = mul_add(-k->end, p->nd, p->no), slack = k->slack * face->slack;
@@ -187,9 +187,9 @@ INLINE struct quick_hit quick_face(const struct flat_face *face, const struct qu
 /* Lanes of points inside the room by more than the margin: one slack where rays begin, of which ROOM_TOLERANCE is a quarter
  * and the exact test's rounding less than the rest; two where they end, since that is computed; four beside an edge, so
  * that the next wall is met clearly later. */
-INLINE vi in_room(const struct small_scene *f, const vf p[3], vf margin)
+INLINE vm in_room(const struct small_scene *f, const vf p[3], vf margin)
 {
-    vi in = vi_set(-1);
+    vm in = vm_set(true);
     for (int a = 0; a < 3; a++)
         in &= vf_lt(f->low[a] + margin, p[a]) & vf_lt(p[a], f->high[a] - margin);
     return in;
@@ -204,25 +204,26 @@ struct nearest {
 
 /* Starts with the wall where rays from inside the room leave it. Returns the lanes whose exit is so far from the room's
  * edges that neither tolerance nor rounding can put another wall before it. */
-INLINE vi leave_room(const struct small_scene *f, const struct rayv *q, const struct quick *k,
+INLINE vm leave_room(const struct small_scene *f, const struct rayv *q, const struct quick *k,
                      struct nearest *n)
 {
     const vf far = vf_set(INFINITY), zero = vf_set(0), margin = 4 * k->slack;
     vf t = far, steep = zero, w[COLUMNS], p[3];
-    vi side = vi_set(0), safe = vi_set(-1);
+    vi side = vi_set(0);
+    vm safe = vm_set(true);
     int32_t number[LANES];
     for (int a = 0; a < 3; a++) {
-        vi down = vf_lt(q->d[a], zero);
+        vm down = vf_lt(q->d[a], zero);
         vf inv = 1 / vf_abs(q->d[a]);
         vf at = vf_abs(vf_select(down, vf_set(f->low[a]), vf_set(f->high[a])) - q->o[a]) * inv;
-        vi nearer = vf_lt(at, t);
+        vm nearer = vf_lt(at, t);
         t = vf_min(at, t);
         steep = vf_select(nearer, inv, steep);
-        side = vi_select(nearer, 2 * a - down, side);
+        side = vi_select(nearer, vi_set(2 * a) + vi_where(down, vi_set(1)), side);
     }
     for (int a = 0; a < 3; a++) {
         p[a] = mul_add(t, q->d[a], q->o[a]);
-        vi in = vf_lt(f->low[a] + margin, p[a]) & vf_lt(p[a], f->high[a] - margin);
+        vm in = vf_lt(f->low[a] + margin, p[a]) & vf_lt(p[a], f->high[a] - margin);
         safe &= in | vi_eq(side & vi_set(6), vi_set(2 * a));
     }
     vi_store_any(number, side);
@@ -230,8 +231,8 @@ INLINE vi leave_room(const struct small_scene *f, const struct rayv *q, const st
     vf beyond = mul_add(w[0], p[0], mul_add(w[1], p[1], mul_add(w[2], p[2], w[3])));
     vf error = k->error * (w[SIDE_PER_AREA] * steep), off = 2 * k->slack * steep;
     n->prim = vi_select(vf_lt(zero, beyond), as_vi(w[SIDE_PRIM + 1]), as_vi(w[SIDE_PRIM]));
-    vi open = vi_lt(as_vi(w[SIDE_PRIM]), vi_set(0));
-    n->prim |= open;
+    vm open = vi_lt(as_vi(w[SIDE_PRIM]), vi_set(0));
+    n->prim = vi_select(open, vi_set(-1), n->prim);
     n->low = vf_select(open, far, t - off);
     n->high = vf_select(open, far, t + off);
     n->sure = vf_abs(beyond) - 2 * error;
@@ -241,14 +242,14 @@ INLINE vi leave_room(const struct small_scene *f, const struct rayv *q, const st
 
 /* Nearest hits by the quick form. Returns the lanes that it could decide; *best is undefined in the
  * others. */
-INLINE vi list_closest_quick(const struct small_scene *f, const struct rayv *q,
+INLINE vm list_closest_quick(const struct small_scene *f, const struct rayv *q,
                              struct list_hits *best)
 {
     const struct quick k = quick_init(f, q);
     const vf far = vf_set(INFINITY), zero = vf_set(0);
     struct nearest n = {far, far, far, zero, zero, vi_set(-1)};
     vf sphere_t = far;
-    vi safe = vi_set(-1);
+    vm safe = vm_set(true);
     int num_faces = f->num_faces;
     if (f->num_walls > 0 && bits(in_room(f, q->o, k.slack)) == ALL_LANES) {
         safe = leave_room(f, q, &k, &n);
@@ -258,7 +259,7 @@ INLINE vi list_closest_quick(const struct small_scene *f, const struct rayv *q,
         const struct flat_face *face = &f->face[i];
         const struct quick_plane p = quick_plane(face, q);
         struct quick_hit h = quick_face(face, &p, q, &k);
-        vi out = vf_lt(h.inside + h.error, zero) | vf_lt(h.high, q->tmin);
+        vm out = vf_lt(h.inside + h.error, zero) | vf_lt(h.high, q->tmin);
         vf begin = vf_select(out, far, h.low), surely = h.inside - h.error;
         vi number = vi_set(face->prim[0]);
         if (!face->is_triangle) {
@@ -266,7 +267,7 @@ INLINE vi list_closest_quick(const struct small_scene *f, const struct rayv *q,
             surely = vf_min(surely, vf_abs(beyond) - 2 * h.error);
             number = vi_select(vf_lt(zero, beyond), vi_set(face->prim[1]), number);
         }
-        vi nearer = vf_lt(begin, n.low);
+        vm nearer = vf_lt(begin, n.low);
         n.second = vf_min(n.second, vf_max(begin, n.low));
         n.low = vf_min(begin, n.low);
         n.high = vf_select(nearer, h.high, n.high);
@@ -276,11 +277,11 @@ INLINE vi list_closest_quick(const struct small_scene *f, const struct rayv *q,
     }
     for (int i = 0; i < f->num_spheres; i++) {
         vf t = far;
-        vi hit = list_sphere(f, i, q, q->tmax, &t);
+        vm hit = list_sphere(f, i, q, q->tmax, &t);
         if (!bits(hit))
             continue;
         vf begin = vf_select(hit, t, far);
-        vi nearer = vf_lt(begin, n.low);
+        vm nearer = vf_lt(begin, n.low);
         n.second = vf_min(n.second, vf_max(begin, n.low));
         n.low = vf_min(begin, n.low);
         n.high = vf_select(nearer, t, n.high);
@@ -288,17 +289,17 @@ INLINE vi list_closest_quick(const struct small_scene *f, const struct rayv *q,
         n.sure = vf_select(nearer, vf_set(1), n.sure);
         n.prim = vi_select(nearer, vi_set(f->num_triangles + i), n.prim);
     }
-    vi nothing = vf_lt(q->tmax, n.low) | vf_eq(n.low, far);
-    vi known = vf_lt(zero, n.sure) & vf_lt(q->tmin, n.low) & vf_lt(n.high, q->tmax) &
+    vm nothing = vf_lt(q->tmax, n.low) | vf_eq(n.low, far);
+    vm known = vf_lt(zero, n.sure) & vf_lt(q->tmin, n.low) & vf_lt(n.high, q->tmax) &
                vf_lt(n.high, n.second);
     known &= ~nothing;
     n.prim = vi_select(known, n.prim, vi_set(-1));
     /* Distance and barycentric coordinates are recomputed by the exact test. */
-    const vi is_x = vi_eq(q->axis, vi_set(0)), is_y = vi_eq(q->axis, vi_set(1));
-    vi flat = vi_lt(n.prim, vi_set(f->num_triangles));
+    const vm is_x = vi_eq(q->axis, vi_set(0)), is_y = vi_eq(q->axis, vi_set(1));
+    vm flat = vi_lt(n.prim, vi_set(f->num_triangles));
     int32_t number[LANES];
     vf w[2][COLUMNS], x[3], y[3], z[3], t = far, u = zero, v = zero;
-    vf_store_any(number, (vf)(n.prim & flat & ~vi_lt(n.prim, vi_set(0))));
+    vf_store_any(number, (vf)vi_where(flat & ~vi_lt(n.prim, vi_set(0)), n.prim));
     gather_columns(f->row[0], FLAT_ROW, number, w[0]);
     gather_columns(f->row[0] + COLUMNS, FLAT_ROW, number, w[1]);
     for (int c = 0; c < 3; c++) {
@@ -308,8 +309,8 @@ INLINE vi list_closest_quick(const struct small_scene *f, const struct rayv *q,
         x[c] = vf_select(is_x, b, vf_select(is_y, e, a)) - q->sx * z[c];
         y[c] = vf_select(is_x, e, vf_select(is_y, a, b)) - q->sy * z[c];
     }
-    vi pass = sheared_hit(x, y, z, q->sz, &t, &u, &v) & vf_lt(q->tmin, t) & vf_lt(t, q->tmax);
-    vi ball = known & ~flat;
+    vm pass = sheared_hit(x, y, z, q->sz, &t, &u, &v) & vf_lt(q->tmin, t) & vf_lt(t, q->tmax);
+    vm ball = known & ~flat;
     best->t = vf_select(nothing, q->tmax, vf_select(ball, sphere_t, t));
     best->u = vf_select(known & flat, u, zero);
     best->v = vf_select(known & flat, v, zero);
@@ -318,12 +319,12 @@ INLINE vi list_closest_quick(const struct small_scene *f, const struct rayv *q,
 }
 
 /* Lanes that are occluded; *known: lanes that the quick form could decide. */
-INLINE vi list_occluded_quick(const struct small_scene *f, const struct rayv *q, vi *known)
+INLINE vm list_occluded_quick(const struct small_scene *f, const struct rayv *q, vm *known)
 {
     const struct quick k = quick_init(f, q);
     const vf zero = vf_set(0);
     vf worst = zero;
-    vi met = vi_set(0), maybe = vi_set(0);
+    vm met = vm_set(false), maybe = met;
     int num_faces = f->num_faces;
     if (f->num_walls > 0) {
         const vf end[3] = {mul_add(k.end, q->d[0], q->o[0]), mul_add(k.end, q->d[1], q->o[1]),
@@ -336,7 +337,7 @@ INLINE vi list_occluded_quick(const struct small_scene *f, const struct rayv *q,
         if (bits(quick_clear(&f->face[i], &p, &k)) == ALL_LANES)
             continue;
         struct quick_hit h = quick_face(&f->face[i], &p, q, &k);
-        vi out = vf_lt(h.inside + h.error, zero) | vf_lt(h.high, q->tmin) | vf_lt(q->tmax, h.low);
+        vm out = vf_lt(h.inside + h.error, zero) | vf_lt(h.high, q->tmin) | vf_lt(q->tmax, h.low);
         met |= vf_lt(h.error, h.inside) & vf_lt(q->tmin, h.low) & vf_lt(h.high, q->tmax);
         maybe |= ~out;
         worst = vf_max(h.error, worst);
@@ -357,9 +358,9 @@ INLINE void list_closest(const struct small_scene *f, const struct rayv *q, stru
 }
 
 /* Lanes that are occluded. The rays need not be sheared, and may be afterwards. */
-INLINE vi list_occluded(const struct small_scene *f, struct rayv *q)
+INLINE vm list_occluded(const struct small_scene *f, struct rayv *q)
 {
-    vi known = vi_set(0), met = known;
+    vm known = vm_set(false), met = known;
     if (f->quick)
         met = list_occluded_quick(f, q, &known);
     if (bits(known) == ALL_LANES)

@@ -58,7 +58,7 @@ static int occluded(const struct wide *w, const struct rays *r, const uint16_t *
         const uint16_t *from = rayv_from(lane, k, num_lanes, filled);
         rayv_load(r, from, &q);
         rayv_ignore(r, from, &q);
-        vi met = list_occluded(w->flat, &q);
+        vm met = list_occluded(w->flat, &q);
         rayv_store_flags(&q, from, met, occluded);
         if (w->num_nodes == 0)
             continue;

@@ -32,10 +32,10 @@ INLINE void packet_init(const struct rayv *q, struct packet *p)
 INLINE bool packet_leaf(const struct wide_leaf *l, struct packet *p, bool spheres, bool any)
 {
     const struct rayv *q = p->q;
-    vi changed = vi_set(0);
+    vm changed = vm_set(false);
     for (int j = 0; j < LANES && l->prim[j] != NO_HIT; j++) {
         vf t, u, v;
-        vi hit;
+        vm hit;
         if (spheres) {
             u = v = vf_set(0);
             hit = sphere_hit(q->o[0] - l->p[0][0][j], q->o[1] - l->p[0][1][j],
@@ -87,9 +87,9 @@ struct bundle {
  * directions, components within 0.1, origins within w->alike. */
 INLINE bool are_alike(const struct wide *w, const struct rayv *q)
 {
-    vi alike = vi_eq(q->axis, vi_set(q->axis[0]));
+    vm alike = vi_eq(q->axis, vi_set(q->axis[0]));
     for (int a = 0; a < 3; a++) {
-        unsigned negative = bits((vi)q->inv[a]);
+        unsigned negative = bits(vf_lt(q->inv[a], vf_set(0)));
         if (negative != 0 && negative != ALL_LANES)
             return false;
         alike &= vf_lt(vf_abs(q->d[a] - q->d[a][0]), vf_set(0.1f));
@@ -161,8 +161,9 @@ INLINE void packet_traverse(const struct wide *w, const struct bundle *b, struct
 
 static void packet_result(const struct packet *p, const uint16_t *lane, struct hits *h)
 {
-    vi none = vi_eq(p->prim, vi_set(NOTHING));
-    rayv_store(p->q, lane, vf_select(none, p->q->tmax, p->limit), p->u, p->v, p->prim | none, h);
+    vm none = vi_eq(p->prim, vi_set(NOTHING));
+    rayv_store(p->q, lane, vf_select(none, p->q->tmax, p->limit), p->u, p->v,
+               vi_select(none, vi_set(-1), p->prim), h);
 }
 
 static void packet_verdict(const struct packet *p, const uint16_t *lane, bool *occluded)

@@ -47,7 +47,7 @@ INLINE void single_init(const struct rayv *q, int lane, struct single *s)
 }
 
 /* Lanes of the leaf that the ray meets inside (tmin, limit]. */
-INLINE vi single_leaf(const struct wide_leaf *l, const struct single *s, bool spheres, vf limit,
+INLINE vm single_leaf(const struct wide_leaf *l, const struct single *s, bool spheres, vf limit,
                       vf *t, vf *u, vf *v)
 {
     const struct rayv *q = s->q;
@@ -67,7 +67,7 @@ INLINE vi single_leaf(const struct wide_leaf *l, const struct single *s, bool sp
         x[c] = vf_load(l->p[c][kx]) - ox - sx * z[c];
         y[c] = vf_load(l->p[c][ky]) - oy - sy * z[c];
     }
-    vi pass = sheared_hit(x, y, z, splat(&q->sz, i), t, u, v);
+    vm pass = sheared_hit(x, y, z, splat(&q->sz, i), t, u, v);
     if (!bits(pass))
         return pass;
     return pass & vf_lt(splat(&q->tmin, i), *t) & vf_le(*t, limit);
@@ -154,7 +154,7 @@ INLINE bool single_visit(const struct wide *w, struct single *s, uint32_t ref, v
 {
     const struct wide_leaf *l = at(w, ref);
     vf t, u, v;
-    vi met = single_leaf(l, s, ref & WIDE_SPHERES, limit, &t, &u, &v);
+    vm met = single_leaf(l, s, ref & WIDE_SPHERES, limit, &t, &u, &v);
     if (!bits(met))
         return false;
     if (!any) {

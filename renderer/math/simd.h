@@ -1,6 +1,9 @@
 /* Lanes of float or of int32: vf, vi and vu (unsigned) hold LANES numbers each: one, eight or sixteen, set by the
  * Makefile. + - * / and & | ^ ~ work on them as operators, LANE() accesses one lane, the rest is below. The same source
- * gives a lane the same bits at every width. A true comparison is a lane of all ones.
+ * gives a lane the same bits at every width.
+ *
+ * A mask, vm, is what comparisons give: bits in a mask register with sixteen lanes, else lanes of all ones or zeros.
+ * & | ~ work on masks as operators; masks and numbers meet only in vf_select(), vi_select() and vi_where().
  *
  * In simd_one.h, simd_eight.h and simd_sixteen.h:
  *   vf_set, vi_set          the same number in all lanes
@@ -10,7 +13,9 @@
  *   vf_min, vf_max          as minf and maxf: if either is NaN the second wins
  *   vf_least                the smallest of all lanes, without NaNs; not of one lane
  *   vf_hypot                sqrt(a a + b b), computed in double
- *   vf_lt, vf_le, vf_eq, vi_lt, vi_eq, vf_select
+ *   vf_lt, vf_le, vf_eq, vi_lt, vi_eq
+ *   vf_select, vi_where     one or the other number by a mask; a number or 0
+ *   vm_set                  a mask of all lanes, or of none
  *   bits, lanes_of          a mask as an integer, bit k for lane k; and back
  *   front_order, pick       the lanes of a mask, in order; pick() moves these lanes of a vector to the front
  *   store_flags             a mask as bytes of 0 or 1
@@ -23,6 +28,7 @@
 #ifndef ASSAY_SIMD_H
 #define ASSAY_SIMD_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <string.h>
@@ -44,6 +50,15 @@ enum { COLUMNS = 8, ALL_LANES = (1 << LANES) - 1 };
 typedef float vf __attribute__((vector_size(4 * LANES)));
 typedef int32_t vi __attribute__((vector_size(4 * LANES)));
 typedef uint32_t vu __attribute__((vector_size(4 * LANES)));
+
+#if LANES < 16
+typedef vi vm;
+#elif defined __SANITIZE_ADDRESS__
+typedef uint64_t
+    vm; /* wider than a lane, so that arithmetic on a mask and numbers does not compile */
+#else
+typedef uint16_t vm;
+#endif
 
 /* Lane i, to read or to write. */
 #define LANE(v, i) ((v)[i])
@@ -112,7 +127,7 @@ INLINE void vi_store_any(void *p, vi a)
 {
     memcpy(p, &a, sizeof a);
 }
-INLINE vi vi_select(vi mask, vi yes, vi no)
+INLINE vi vi_select(vm mask, vi yes, vi no)
 {
     return as_vi(vf_select(mask, as_vf(yes), as_vf(no)));
 }

@@ -58,31 +58,31 @@ INLINE vf mul_add(vf a, vf b, vf c)
 {
     return (vf)_mm256_fmadd_ps((__m256)a, (__m256)b, (__m256)c);
 }
-INLINE vi vf_lt(vf a, vf b)
+INLINE vm vf_lt(vf a, vf b)
 {
     return (vi)_mm256_cmp_ps((__m256)a, (__m256)b, _CMP_LT_OQ);
 }
-INLINE vi vf_le(vf a, vf b)
+INLINE vm vf_le(vf a, vf b)
 {
     return (vi)_mm256_cmp_ps((__m256)a, (__m256)b, _CMP_LE_OQ);
 }
-INLINE vi vf_eq(vf a, vf b)
+INLINE vm vf_eq(vf a, vf b)
 {
     return (vi)_mm256_cmp_ps((__m256)a, (__m256)b, _CMP_EQ_OQ);
 }
-INLINE vi vi_lt(vi a, vi b)
+INLINE vm vi_lt(vi a, vi b)
 {
     return (vi)_mm256_cmpgt_epi32((__m256i)b, (__m256i)a);
 }
-INLINE vi vi_eq(vi a, vi b)
+INLINE vm vi_eq(vi a, vi b)
 {
     return (vi)_mm256_cmpeq_epi32((__m256i)a, (__m256i)b);
 }
-INLINE vf vf_select(vi mask, vf yes, vf no)
+INLINE vf vf_select(vm mask, vf yes, vf no)
 {
     return (vf)_mm256_blendv_ps((__m256)no, (__m256)yes, (__m256)mask);
 }
-INLINE unsigned bits(vi mask)
+INLINE unsigned bits(vm mask)
 {
     return (unsigned)_mm256_movemask_ps((__m256)mask);
 }
@@ -174,34 +174,34 @@ INLINE vf mul_add(vf a, vf b, vf c)
 {
     return a * b + c;
 }
-INLINE vi vf_lt(vf a, vf b)
+INLINE vm vf_lt(vf a, vf b)
 {
     BY_HALVES(_mm_cmplt_ps, a, b);
     return (vi)r.all;
 }
-INLINE vi vf_le(vf a, vf b)
+INLINE vm vf_le(vf a, vf b)
 {
     BY_HALVES(_mm_cmple_ps, a, b);
     return (vi)r.all;
 }
-INLINE vi vf_eq(vf a, vf b)
+INLINE vm vf_eq(vf a, vf b)
 {
     BY_HALVES(_mm_cmpeq_ps, a, b);
     return (vi)r.all;
 }
-INLINE vi vi_lt(vi a, vi b)
+INLINE vm vi_lt(vi a, vi b)
 {
     BY_HALVES_INT(_mm_cmpgt_epi32, b, a);
 }
-INLINE vi vi_eq(vi a, vi b)
+INLINE vm vi_eq(vi a, vi b)
 {
     BY_HALVES_INT(_mm_cmpeq_epi32, a, b);
 }
-INLINE vf vf_select(vi mask, vf yes, vf no)
+INLINE vf vf_select(vm mask, vf yes, vf no)
 {
     return (vf)((mask & (vi)yes) | (~mask & (vi)no));
 }
-INLINE unsigned bits(vi mask)
+INLINE unsigned bits(vm mask)
 {
     union vi_halves x = {mask};
     return (unsigned)(_mm_movemask_ps(x.as_float[0]) | _mm_movemask_ps(x.as_float[1]) << 4);
@@ -241,17 +241,25 @@ INLINE float vf_least(vf a)
     a = vf_min(a, __builtin_shufflevector(a, a, 1, 0, 3, 2, 5, 4, 7, 6));
     return a[0];
 }
-INLINE vi lanes_of(unsigned mask)
+INLINE vm lanes_of(unsigned mask)
 {
     const vi bit = {1, 2, 4, 8, 16, 32, 64, 128};
     return vi_eq(vi_set((int32_t)mask) & bit, bit);
+}
+INLINE vm vm_set(bool on)
+{
+    return vi_set(-on);
+}
+INLINE vi vi_where(vm mask, vi a)
+{
+    return mask & a;
 }
 /* Bits as eight bytes of 0 or 1, the lowest first. */
 INLINE uint64_t bytes_of(unsigned mask)
 {
     return ((mask & 127) * 0x0002040810204081u & 0x0101010101010101u) | (uint64_t)(mask >> 7) << 56;
 }
-INLINE void store_flags(void *flags, vi mask)
+INLINE void store_flags(void *flags, vm mask)
 {
     const uint64_t bytes = bytes_of(bits(mask));
     memcpy(flags, &bytes, sizeof bytes);

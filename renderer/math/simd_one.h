@@ -4,6 +4,7 @@
 
 typedef float vf;
 typedef int32_t vi;
+typedef int32_t vm;
 typedef uint32_t vu;
 typedef uint64_t vw;
 
@@ -49,37 +50,45 @@ INLINE vf vf_hypot(vf a, vf b)
 {
     return (float)__builtin_sqrt((double)a * (double)a + (double)b * (double)b);
 }
-INLINE vi vf_lt(vf a, vf b)
+INLINE vm vf_lt(vf a, vf b)
 {
     return -(a < b);
 }
-INLINE vi vf_le(vf a, vf b)
+INLINE vm vf_le(vf a, vf b)
 {
     return -(a <= b);
 }
-INLINE vi vf_eq(vf a, vf b)
+INLINE vm vf_eq(vf a, vf b)
 {
     return -(a == b);
 }
-INLINE vi vi_lt(vi a, vi b)
+INLINE vm vi_lt(vi a, vi b)
 {
     return -(a < b);
 }
-INLINE vi vi_eq(vi a, vi b)
+INLINE vm vi_eq(vi a, vi b)
 {
     return -(a == b);
 }
-INLINE vf vf_select(vi mask, vf yes, vf no)
+INLINE vf vf_select(vm mask, vf yes, vf no)
 {
     return mask ? yes : no;
 }
-INLINE unsigned bits(vi mask)
+INLINE unsigned bits(vm mask)
 {
     return mask & 1;
 }
-INLINE vi lanes_of(unsigned mask)
+INLINE vm lanes_of(unsigned mask)
 {
     return -(vi)mask;
+}
+INLINE vm vm_set(bool on)
+{
+    return -on;
+}
+INLINE vi vi_where(vm mask, vi a)
+{
+    return mask & a;
 }
 INLINE vi front_order(unsigned mask)
 {
@@ -95,7 +104,7 @@ INLINE unsigned spread_flags(const void *flags, unsigned mask)
 {
     return mask & *(const unsigned char *)flags;
 }
-INLINE void store_flags(void *flags, vi mask)
+INLINE void store_flags(void *flags, vm mask)
 {
     *(unsigned char *)flags = mask & 1;
 }

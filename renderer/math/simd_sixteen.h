@@ -61,38 +61,45 @@ INLINE vf mul_add(vf a, vf b, vf c)
 {
     return (vf)_mm512_fmadd_ps((__m512)a, (__m512)b, (__m512)c);
 }
-INLINE vi lanes_of(unsigned mask)
+INLINE vm lanes_of(unsigned mask)
 {
-    return (vi)_mm512_movm_epi32((__mmask16)mask);
+    return (vm)mask;
 }
-INLINE vi vf_lt(vf a, vf b)
+INLINE unsigned bits(vm mask)
 {
-    return a < b;
+    return mask & ALL_LANES;
 }
-INLINE vi vf_le(vf a, vf b)
+INLINE vm vf_lt(vf a, vf b)
 {
-    return a <= b;
+    return _mm512_cmp_ps_mask((__m512)a, (__m512)b, _CMP_LT_OQ);
 }
-INLINE vi vf_eq(vf a, vf b)
+INLINE vm vf_le(vf a, vf b)
 {
-    return a == b;
+    return _mm512_cmp_ps_mask((__m512)a, (__m512)b, _CMP_LE_OQ);
 }
-INLINE vi vi_lt(vi a, vi b)
+INLINE vm vf_eq(vf a, vf b)
 {
-    return a < b;
+    return _mm512_cmp_ps_mask((__m512)a, (__m512)b, _CMP_EQ_OQ);
 }
-INLINE vi vi_eq(vi a, vi b)
+INLINE vm vi_lt(vi a, vi b)
 {
-    return a == b;
+    return _mm512_cmplt_epi32_mask((__m512i)a, (__m512i)b);
 }
-/* Written such that gcc compiles it to a blend under a mask register. */
-INLINE vf vf_select(vi mask, vf yes, vf no)
+INLINE vm vi_eq(vi a, vi b)
 {
-    return (vf)((mask & (vi)yes) | (~mask & (vi)no));
+    return _mm512_cmpeq_epi32_mask((__m512i)a, (__m512i)b);
 }
-INLINE unsigned bits(vi mask)
+INLINE vf vf_select(vm mask, vf yes, vf no)
 {
-    return _mm512_movepi32_mask((__m512i)mask);
+    return (vf)_mm512_mask_blend_ps(mask, (__m512)no, (__m512)yes);
+}
+INLINE vm vm_set(bool on)
+{
+    return on ? ALL_LANES : 0;
+}
+INLINE vi vi_where(vm mask, vi a)
+{
+    return (vi)_mm512_maskz_mov_epi32(mask, (__m512i)a);
 }
 INLINE vi front_order(unsigned mask)
 {
@@ -102,9 +109,9 @@ INLINE vf pick(vf a, vi order)
 {
     return (vf)_mm512_permutexvar_ps((__m512i)order, (__m512)a);
 }
-INLINE void store_flags(void *flags, vi mask)
+INLINE void store_flags(void *flags, vm mask)
 {
-    _mm_storeu_si128(flags, _mm_maskz_set1_epi8((__mmask16)bits(mask), 1));
+    _mm_storeu_si128(flags, _mm_maskz_set1_epi8(mask, 1));
 }
 INLINE unsigned spread_flags(const void *flags, unsigned mask)
 {
@@ -149,28 +156,28 @@ INLINE vw vw_xor(vw a, vw b, uint32_t k)
                 _mm512_ternarylogic_epi64(a.odd, b.odd, c, 0x96)};
 }
 
-/* Loads sixteen rows of eight and transposes them, four columns at a time: those of rows i, 4 + i, 8 + i and 12 + i
- * share a register, then each block of 4 x 4 is transposed. */
+/* Loads sixteen rows of eight, two to a register, and transposes them by blocks of 4 x 4. */
 INLINE void gather_columns(const float *base, size_t stride, const int32_t index[LANES],
                            vf column[COLUMNS])
 {
-    for (int c = 0; c < COLUMNS; c += 4) {
+    __m512 block[2][4];
+    for (int half = 0; half < 2; half++) {
         __m512 a[4];
         for (int i = 0; i < 4; i++) {
-            __m128 part[4];
-            for (int k = 0; k < 4; k++)
-                part[k] = _mm_loadu_ps(base + stride * (size_t)index[4 * k + i] + c);
-            a[i] = _mm512_castps128_ps512(part[0]);
-            a[i] = _mm512_insertf32x4(a[i], part[1], 1);
-            a[i] = _mm512_insertf32x4(a[i], part[2], 2);
-            a[i] = _mm512_insertf32x4(a[i], part[3], 3);
+            const int32_t *at = index + 8 * half + i;
+            a[i] = _mm512_castps256_ps512(_mm256_loadu_ps(base + stride * (size_t)at[0]));
+            a[i] = _mm512_insertf32x8(a[i], _mm256_loadu_ps(base + stride * (size_t)at[4]), 1);
         }
         __m512 low01 = _mm512_unpacklo_ps(a[0], a[1]), low23 = _mm512_unpacklo_ps(a[2], a[3]);
         __m512 high01 = _mm512_unpackhi_ps(a[0], a[1]), high23 = _mm512_unpackhi_ps(a[2], a[3]);
-        column[c] = (vf)_mm512_shuffle_ps(low01, low23, 0x44);
-        column[c + 1] = (vf)_mm512_shuffle_ps(low01, low23, 0xEE);
-        column[c + 2] = (vf)_mm512_shuffle_ps(high01, high23, 0x44);
-        column[c + 3] = (vf)_mm512_shuffle_ps(high01, high23, 0xEE);
+        block[half][0] = _mm512_shuffle_ps(low01, low23, 0x44);
+        block[half][1] = _mm512_shuffle_ps(low01, low23, 0xEE);
+        block[half][2] = _mm512_shuffle_ps(high01, high23, 0x44);
+        block[half][3] = _mm512_shuffle_ps(high01, high23, 0xEE);
+    }
+    for (int c = 0; c < 4; c++) {
+        column[c] = (vf)_mm512_shuffle_f32x4(block[0][c], block[1][c], 0x88);
+        column[4 + c] = (vf)_mm512_shuffle_f32x4(block[0][c], block[1][c], 0xDD);
     }
 }
 

@@ -23,7 +23,7 @@ INLINE void trig_turn(vf v, vf *sine, vf *cosine)
     vi quarter = vi_truncate(4 * v + 0.5f);
     vf s, c;
     trig_small(two_pi * (v - 0.25f * vf_of_int(quarter)), &s, &c);
-    vi is_odd = vi_eq(quarter & 1, vi_set(1));
+    vm is_odd = vi_eq(quarter & 1, vi_set(1));
     vf along = vf_select(is_odd, s, c), across = vf_select(is_odd, c, s);
     *cosine = as_vf(as_vi(along) ^ (vi)(((vu)(quarter + 1) & 2) << 30));
     *sine = as_vf(as_vi(across) ^ (vi)(((vu)quarter & 2) << 30));
@@ -33,11 +33,11 @@ INLINE void trig_turn(vf v, vf *sine, vf *cosine)
 INLINE vf trig_atan2(vf y, vf x)
 {
     const vf zero = vf_set(0), ax = vf_abs(x), ay = vf_abs(y);
-    const vi steep = vf_lt(ax, ay);
+    const vm steep = vf_lt(ax, ay);
     const vf most = vf_select(steep, ay, ax), least = vf_select(steep, ax, ay);
     vf t = least / vf_max(most, vf_set(1e-37f));
     /* Above tan(pi/8) the angle is reduced by an eighth of a turn. */
-    const vi beyond = vf_lt(vf_set(0.4142135623730950f), t);
+    const vm beyond = vf_lt(vf_set(0.4142135623730950f), t);
     t = vf_select(beyond, (t - 1) / (t + 1), t);
     vf z = t * t;
     vf a = t + t * z *

@@ -24,11 +24,11 @@ typedef struct {
 #endif
 
 /* -a where the mask is set. */
-INLINE vf vf_negate_if(vi mask, vf a)
+INLINE vf vf_negate_if(vm mask, vf a)
 {
-    return as_vf(as_vi(a) ^ (mask & vi_set(INT32_MIN)));
+    return as_vf(as_vi(a) ^ vi_where(mask, vi_set(INT32_MIN)));
 }
-INLINE vec3v v3_negate_if(vi mask, vec3v a)
+INLINE vec3v v3_negate_if(vm mask, vec3v a)
 {
     return (vec3v){vf_negate_if(mask, a.x), vf_negate_if(mask, a.y), vf_negate_if(mask, a.z)};
 }
@@ -40,7 +40,7 @@ INLINE vec3v v3_negate_if(vi mask, vec3v a)
 #define FRAME      framev
 #define OF(name)   name##v
 #define ROOT(x)    vf_sqrt(x)
-#define SIGN_OF(x) vf_negate_if(as_vi(x), vf_set(1))
+#define SIGN_OF(x) as_vf((as_vi(x) & vi_set(INT32_MIN)) | as_vi(vf_set(1)))
 #include "vec_ops.h"
 
 INLINE vec3v v3v(vf x, vf y, vf z)
@@ -56,18 +56,18 @@ INLINE rgbv rgb_all(rgb a)
 {
     return (rgbv){vf_set(a.r), vf_set(a.g), vf_set(a.b)};
 }
-INLINE vec3v v3_select(vi mask, vec3v yes, vec3v no)
+INLINE vec3v v3_select(vm mask, vec3v yes, vec3v no)
 {
     return v3v(vf_select(mask, yes.x, no.x), vf_select(mask, yes.y, no.y),
                vf_select(mask, yes.z, no.z));
 }
-INLINE rgbv rgb_select(vi mask, rgbv yes, rgbv no)
+INLINE rgbv rgb_select(vm mask, rgbv yes, rgbv no)
 {
     return (rgbv){vf_select(mask, yes.r, no.r), vf_select(mask, yes.g, no.g),
                   vf_select(mask, yes.b, no.b)};
 }
 /* a where the mask is set, black elsewhere. */
-INLINE rgbv rgb_where(vi mask, rgbv a)
+INLINE rgbv rgb_where(vm mask, rgbv a)
 {
     return rgb_select(mask, a, rgb_all((rgb){0, 0, 0}));
 }
@@ -75,7 +75,7 @@ INLINE vf rgb_maxv(rgbv a)
 {
     return vf_max(a.r, vf_max(a.g, a.b));
 }
-INLINE vi rgb_is_zerov(rgbv a)
+INLINE vm rgb_is_zerov(rgbv a)
 {
     const vf zero = vf_set(0);
     return vf_eq(a.r, zero) & vf_eq(a.g, zero) & vf_eq(a.b, zero);

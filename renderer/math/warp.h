@@ -11,7 +11,7 @@ INLINE void warp_disk(vf u, vf v, vf *x, vf *y)
 {
     vf a = 2 * u - 1, b = 2 * v - 1, s, c;
     /* The angle is taken from the nearer axis, so it is at most an eighth of a turn. */
-    vi near_x = vf_lt(vf_abs(b), vf_abs(a));
+    vm near_x = vf_lt(vf_abs(b), vf_abs(a));
     vf r = vf_select(near_x, a, b), other = vf_select(near_x, b, a);
     /* r is 0 only where both are: then the angle does not matter. */
     trig_small(0.25f * PI_F * (other / vf_select(vf_eq(r, vf_set(0)), vf_set(1), r)), &s, &c);

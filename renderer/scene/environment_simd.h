@@ -30,12 +30,10 @@ struct environment {
     uint32_t num_rows, num_columns;      /* of regions */
     uint8_t *region_row, *region_column; /* by row and by column of cells */
     uint32_t row_first[REGION_ROWS + 1], column_first[REGION_COLUMNS + 1]; /* first of a region */
-    uint32_t *
-        region_end; /* per normal: steps of the rows of regions, then of the columns in each row */
     uint32_t
-        *row_end; /* per column of regions: steps of the rows of cells, anew for each region */
-    float
-        *row_pdf_w; /* likewise: probability of the row, divided by the solid angle of one cell */
+        *region_end; /* per normal: steps of the rows of regions, then of the columns in each row */
+    uint32_t *row_end; /* per column of regions: steps of the rows of cells, anew for each region */
+    float *row_pdf_w; /* likewise: probability of the row, divided by the solid angle of one cell */
     uint32_t *column_end; /* `width` steps per row of cells, anew for each region */
 };
 
@@ -78,7 +76,8 @@ INLINE struct skyplacev sky_place(const struct environment *env, vec3v w, unsign
     vf theta = trig_atan2(vf_hypot(w.x, w.z), w.y), phi = trig_atan2(-w.z, w.x);
     vf x = (phi * (0.5f * INV_PI_F) + 0.5f) * (float)width + 0.5f,
        y = theta * INV_PI_F * (float)height + 0.5f;
-    vi there = lanes_of(mask), row = vi_truncate(y) & there, column = vi_truncate(x) & there;
+    const vm there = lanes_of(mask);
+    vi row = vi_where(there, vi_truncate(y)), column = vi_where(there, vi_truncate(x));
     row = vi_select(vi_lt(vi_set(height), row), vi_set(height), row);
     struct skyplacev p = {.row = row, .down = y - vf_of_int(row), .right = x - vf_of_int(column)};
     p.column = vi_select(vi_lt(column, vi_set(width)), column, column - width);
@@ -205,7 +204,7 @@ INLINE void sample_sky(const struct environment *env, vec3v n, const vf u[4], un
         .row = vi_load_any(row), .column = vi_load_any(column), .right = vf_load_any(part[1])};
     const vf s = vf_load_any(begin) + vf_load_any(part[0]) * vf_load_any(growth),
              from_pole = vf_sqrt(s), along = vf_sqrt(1 - s);
-    const vi lower = vi_lt(vi_set((int32_t)env->height / 2), p.row);
+    const vm lower = vi_lt(vi_set((int32_t)env->height / 2), p.row);
     const vf rows = trig_atan2(from_pole, along) * (2 * INV_PI_F * height), r = vf_of_int(p.row);
     p.down = vf_select(lower, height - r + 0.5f - rows, rows + 0.5f - r);
     vf turn = (vf_of_int(p.column) - 0.5f + p.right) / width, sine, cosine,
@@ -253,7 +252,7 @@ INLINE rgbv look_up_environment(const struct environment *env, const vec3v *n, v
     if (env->kind != ENVIRONMENT_IMAGE) {
         if (n != NULL)
             *pdf_w = even_sky_pdf_w(env, *n, w);
-        const vi lit = env->kind == ENVIRONMENT_CONSTANT ? vi_set(-1) : vf_lt(vf_set(0), w.y);
+        const vm lit = env->kind == ENVIRONMENT_CONSTANT ? vm_set(true) : vf_lt(vf_set(0), w.y);
         return rgb_where(lit, rgb_all(env->radiance));
     }
     const struct skyplacev p = sky_place(env, w, mask);

@@ -10,7 +10,7 @@
 INLINE vf filter_places(const struct pixel_filter *f, vf u)
 {
     enum { MANTISSA = 23 - PIXEL_FILTER_BITS };
-    const vi left = vf_lt(u, vf_set(0.5f));
+    const vm left = vf_lt(u, vf_set(0.5f));
     const vi word = as_vi(vf_max(vf_select(left, u, 1 - u), vf_set(PIXEL_FILTER_LEAST)));
     const vi bin = (word >> MANTISSA) - PIXEL_FILTER_FIRST;
     const vf w = vf_of_int(word & ((1 << MANTISSA) - 1)) * (1.0f / (1 << MANTISSA));

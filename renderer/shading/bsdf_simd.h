@@ -21,7 +21,7 @@ struct materialv {
     vf ior, alpha;
 };
 
-INLINE vi has_bits(vi a, int which)
+INLINE vm has_bits(vi a, int which)
 {
     return ~vi_eq(a & which, vi_set(0));
 }
@@ -51,12 +51,12 @@ struct bsdf_samplev {
     vf pdf_w; /* per steradian; 1 if delta */
     vf eta2; /* factor by which weight divides radiance from behind a refracting boundary, (n_behind / n_here)^2; else
                  1. The product along a path is 1 again where it leaves the glass. */
-    vi delta; /* sampled from a delta lobe, which light sampling cannot find */
+    vm delta; /* sampled from a delta lobe, which light sampling cannot find */
 };
 
 INLINE rgbv mirror_reflectance(const struct materialv *m, vf cos_m)
 {
-    vi conductor = has_bits(m->bits, MATERIAL_IS_CONDUCTOR);
+    vm conductor = has_bits(m->bits, MATERIAL_IS_CONDUCTOR);
     if (!bits(conductor))
         return m->reflectance;
     rgbv f = {fresnel_conductor(cos_m, m->eta.r, m->k.r),
@@ -69,7 +69,7 @@ INLINE rgbv mirror_reflectance(const struct materialv *m, vf cos_m)
  * [Walter07 eq. 14], which cancels the cosine in the density of h. *d: D(h). */
 INLINE vf pdf_microfacet(vi kind, vf alpha, vec3v wo, vec3v wi, vec3v h, vf *d)
 {
-    vi low = vf_lt(wo.z, vf_set(LOWEST_COS)) | vf_lt(wi.z, vf_set(LOWEST_COS));
+    vm low = vf_lt(wo.z, vf_set(LOWEST_COS)) | vf_lt(wi.z, vf_set(LOWEST_COS));
     *d = microfacet_d(kind, alpha, h);
     return vf_select(low, vf_set(0), *d / (4 * (1 + microfacet_lambda(kind, alpha, wo)) * wo.z));
 }
@@ -80,10 +80,10 @@ INLINE vf shadowing(const struct materialv *m, vi kind, vec3v wo, vec3v wi)
 }
 
 /* F D G / (4 cos_o cos_i) [Walter07 eq. 20]. */
-INLINE rgbv eval_microfacet(const struct materialv *m, vi lanes, vec3v wo, vec3v wi, vf *pdf_w)
+INLINE rgbv eval_microfacet(const struct materialv *m, vm lanes, vec3v wo, vec3v wi, vf *pdf_w)
 {
-    vi low = vf_lt(wo.z, vf_set(LOWEST_COS)) | vf_lt(wi.z, vf_set(LOWEST_COS)), kind = m->facets;
-    kind &= lanes & ~low;
+    vm low = vf_lt(wo.z, vf_set(LOWEST_COS)) | vf_lt(wi.z, vf_set(LOWEST_COS));
+    vi kind = vi_where(lanes & ~low, m->facets);
     vec3v h = normalizev(addv(wo, wi));
     vf d, g = shadowing(m, kind, wo, wi);
     *pdf_w = pdf_microfacet(kind, m->alpha, wo, wi, h, &d);
@@ -92,16 +92,16 @@ INLINE rgbv eval_microfacet(const struct materialv *m, vi lanes, vec3v wo, vec3v
     return rgb_where(~low, rgb_scalev(f, d * g / (4 * wo.z * wi.z)));
 }
 
-INLINE void sample_microfacet(const struct materialv *m, vi lanes, vec3v wo, vf u, vf v,
+INLINE void sample_microfacet(const struct materialv *m, vm lanes, vec3v wo, vf u, vf v,
                               struct bsdf_samplev *s)
 {
-    vi kind = m->facets & lanes;
+    vi kind = vi_where(lanes, m->facets);
     vec3v h = microfacet_sample(kind, m->alpha, wo, u, v);
     vf cos_m = dotv(wo, h), d;
     vec3v wi = subv(scalev(h, 2 * cos_m), wo);
     lanes &= ~vf_lt(wo.z, vf_set(LOWEST_COS)) & vf_lt(vf_set(0), cos_m) &
              ~vf_lt(wi.z, vf_set(LOWEST_COS));
-    kind &= lanes;
+    kind = vi_where(lanes, kind);
     vf pdf_w = pdf_microfacet(kind, m->alpha, wo, wi, normalizev(addv(wo, wi)), &d);
     /* D, the cosines and the Jacobian cancel. */
     vf weight = shadowing(m, kind, wo, wi) * (1 + microfacet_lambda(kind, m->alpha, wo));
@@ -110,7 +110,7 @@ INLINE void sample_microfacet(const struct materialv *m, vi lanes, vec3v wo, vf 
     s->pdf_w = vf_select(lanes, pdf_w, s->pdf_w);
 }
 
-INLINE void sample_delta(vi lanes, vec3v wi, rgbv weight, vf eta2, struct bsdf_samplev *s)
+INLINE void sample_delta(vm lanes, vec3v wi, rgbv weight, vf eta2, struct bsdf_samplev *s)
 {
     s->wi = v3_select(lanes, wi, s->wi);
     s->weight = rgb_select(lanes, weight, s->weight);
@@ -119,24 +119,24 @@ INLINE void sample_delta(vi lanes, vec3v wi, rgbv weight, vf eta2, struct bsdf_s
     s->delta |= lanes;
 }
 
-INLINE void sample_mirror(vi lanes, vec3v wo, rgbv weight, struct bsdf_samplev *s)
+INLINE void sample_mirror(vm lanes, vec3v wo, rgbv weight, struct bsdf_samplev *s)
 {
     sample_delta(lanes, v3v(-wo.x, -wo.y, wo.z), weight, vf_set(1), s);
 }
 
 /* Glass, and refraction without reflection. eta: index behind over index on the side of wo. Radiance is
  * larger by eta^2 behind the boundary, so radiance that comes from there is divided by it [Veach97 5.2]. */
-INLINE void sample_dielectric(const struct materialv *m, vi lanes, vi front, vec3v wo, vf lobe,
+INLINE void sample_dielectric(const struct materialv *m, vm lanes, vm front, vec3v wo, vf lobe,
                               struct bsdf_samplev *s)
 {
     vf eta = vf_select(front, m->ior, 1 / m->ior), eta2 = eta * eta, cos_t;
-    vi schlick = has_bits(m->bits, MATERIAL_IS_SCHLICK);
+    vm schlick = has_bits(m->bits, MATERIAL_IS_SCHLICK);
     vf reflected = fresnel_dielectric(wo.z, eta, &cos_t);
     reflected = vf_select(schlick, fresnel_schlick(wo.z, eta, &cos_t), reflected);
-    vi only_through = has_bits(m->bits, 1 << MATERIAL_REFRACTION);
+    vm only_through = has_bits(m->bits, 1 << MATERIAL_REFRACTION);
     /* The lobe is picked with its own share, which then cancels. */
-    vi back = lanes & ~only_through & vf_lt(lobe, reflected);
-    vi through = lanes & ~back & (~only_through | vf_lt(vf_set(0), cos_t));
+    vm back = lanes & ~only_through & vf_lt(lobe, reflected);
+    vm through = lanes & ~back & (~only_through | vf_lt(vf_set(0), cos_t));
     sample_mirror(back, wo, m->reflectance, s);
     sample_delta(through, v3v(-wo.x / eta, -wo.y / eta, -cos_t),
                  rgb_scalev(m->transmittance, 1 / eta2), eta2, s);
@@ -149,12 +149,12 @@ INLINE rgbv eval_diffuse(rgbv reflectance)
 }
 
 /* f, and the density of wi, for lanes whose material is not purely diffuse. diffuse: f of the diffuse part. */
-INLINE rgbv eval_lobes(const struct materialv *m, vi lanes, rgbv diffuse, vec3v wo, vec3v wi,
+INLINE rgbv eval_lobes(const struct materialv *m, vm lanes, rgbv diffuse, vec3v wo, vec3v wi,
                        vf *pdf_w)
 {
     const vf zero = vf_set(0);
     rgbv f = eval_microfacet(m, lanes, wo, wi, pdf_w);
-    vi plastic = lanes & has_bits(m->bits, 1 << MATERIAL_PLASTIC);
+    vm plastic = lanes & has_bits(m->bits, 1 << MATERIAL_PLASTIC);
     if (!bits(plastic))
         return f;
     const vf mirror = m->ior, highlight = m->transmittance.r; /* shares */
@@ -166,12 +166,12 @@ INLINE rgbv eval_lobes(const struct materialv *m, vi lanes, rgbv diffuse, vec3v 
 
 /* Picks one lobe with the probability of its share. Outside the mirror, weight and density are those of the diffuse and
  * the rough lobe together. On entry s holds a direction of the diffuse lobe. */
-INLINE void sample_plastic(const struct materialv *m, vi lanes, rgbv reflectance, vec3v wo,
+INLINE void sample_plastic(const struct materialv *m, vm lanes, rgbv reflectance, vec3v wo,
                            const vf u[4], struct bsdf_samplev *s)
 {
     const vf zero = vf_set(0), mirror = m->ior, highlight = m->transmittance.r;
-    vi mirrored = lanes & vf_lt(u[2], mirror);
-    vi facet = lanes & ~mirrored & vf_lt(u[2], mirror + highlight);
+    vm mirrored = lanes & vf_lt(u[2], mirror);
+    vm facet = lanes & ~mirrored & vf_lt(u[2], mirror + highlight);
     if (bits(facet))
         sample_microfacet(m, facet, wo, u[0], u[1], s);
     lanes &= ~mirrored & (~facet | vf_lt(zero, s->pdf_w));
@@ -191,8 +191,8 @@ INLINE void sample_lobes(const float *record, const int32_t number[LANES], vi ki
                          const vf u[4], struct bsdf_samplev *s)
 {
     const vf zero = vf_set(0);
-    vi above = vf_lt(zero, wo.z), diffuse = has_bits(kinds, 1 << MATERIAL_DIFFUSE);
-    *s = (struct bsdf_samplev){.eta2 = vf_set(1), .delta = vi_set(0)};
+    vm above = vf_lt(zero, wo.z), diffuse = has_bits(kinds, 1 << MATERIAL_DIFFUSE);
+    *s = (struct bsdf_samplev){.eta2 = vf_set(1), .delta = vm_set(false)};
     s->wi = warp_cosine_hemisphere(u[0], u[1]);
     s->pdf_w = vf_select(diffuse & above, warp_cosine_hemisphere_pdf_w(s->wi.z), zero);
     s->weight = reflectance; /* (albedo/pi) cos / (cos/pi) */
@@ -201,17 +201,17 @@ INLINE void sample_lobes(const float *record, const int32_t number[LANES], vi ki
         return;
     struct materialv m;
     materials_gather(record, number, &m);
-    vi lanes = lanes_of(other);
-    vi mirror = lanes & has_bits(kinds, 1 << MATERIAL_MIRROR);
+    vm lanes = lanes_of(other);
+    vm mirror = lanes & has_bits(kinds, 1 << MATERIAL_MIRROR);
     if (bits(mirror))
         sample_mirror(mirror, wo, m.reflectance, s);
-    vi dielectric = lanes & has_bits(kinds, 1 << MATERIAL_GLASS | 1 << MATERIAL_REFRACTION);
+    vm dielectric = lanes & has_bits(kinds, 1 << MATERIAL_GLASS | 1 << MATERIAL_REFRACTION);
     if (bits(dielectric))
         sample_dielectric(&m, dielectric, lanes_of(spread_flags(front, ALL_LANES)), wo, u[2], s);
-    vi rough = lanes & has_bits(kinds, 1 << MATERIAL_MICROFACET);
+    vm rough = lanes & has_bits(kinds, 1 << MATERIAL_MICROFACET);
     if (bits(rough))
         sample_microfacet(&m, rough, wo, u[0], u[1], s);
-    vi plastic = lanes & has_bits(kinds, 1 << MATERIAL_PLASTIC);
+    vm plastic = lanes & has_bits(kinds, 1 << MATERIAL_PLASTIC);
     if (bits(plastic))
         sample_plastic(&m, plastic, reflectance, wo, u, s);
 }

@@ -12,7 +12,7 @@ INLINE vf fresnel_dielectric(vf cos_i, vf eta, vf *cos_t)
     const vf zero = vf_set(0);
     /* eta^2 - sin^2, in a form that keeps its digits for eta near 1 and at grazing angles. */
     vf d = (eta - 1) * (eta + 1) + cos_i * cos_i;
-    vi total = vf_le(d, zero);
+    vm total = vf_le(d, zero);
     vf c = vf_sqrt(d) / eta;
     vf parallel = (eta * cos_i - c) / (eta * cos_i + c);
     vf perpendicular = (cos_i - eta * c) / (cos_i + eta * c);
@@ -25,7 +25,7 @@ INLINE vf fresnel_dielectric(vf cos_i, vf eta, vf *cos_t)
  * assignment, even if that is the denser side. Total reflection stays total. */
 INLINE vf fresnel_schlick(vf cos_i, vf eta, vf *cos_t)
 {
-    vi total = vf_eq(fresnel_dielectric(cos_i, eta, cos_t), vf_set(1));
+    vm total = vf_eq(fresnel_dielectric(cos_i, eta, cos_t), vf_set(1));
     vf r0 = (1 - eta) / (1 + eta), m = 1 - cos_i;
     r0 *= r0;
     return vf_select(total, vf_set(1), r0 + (1 - r0) * m * m * m * m * m);
@@ -45,7 +45,7 @@ INLINE vf fresnel_conductor(vf cos_i, vf eta, vf k)
     vf perpendicular = (a2b2 + cos2 - 2 * a * cos_i) / (a2b2 + cos2 + 2 * a * cos_i);
     vf parallel = perpendicular * (cos2 * a2b2 + sin2 * sin2 - 2 * a * cos_i * sin2) /
                   (cos2 * a2b2 + sin2 * sin2 + 2 * a * cos_i * sin2);
-    vi none = vf_eq(eta, vf_set(0)) & vf_eq(k, vf_set(0));
+    vm none = vf_eq(eta, vf_set(0)) & vf_eq(k, vf_set(0));
     return vf_select(none, vf_set(1), 0.5f * (parallel + perpendicular));
 }
 

@@ -39,7 +39,7 @@ INLINE vf cluster_weight(const struct light_cluster *c, vec3v p, vec3v n)
     const vf sent = c->even * d + (1 - c->even) * ahead;
     const vf w =
         c->value * height * sent / (d2 * (c->falloff[0] + d * c->falloff[1] + d2 * c->falloff[2]));
-    const vi lit = vf_lt(zero, height) & vf_lt(c->reach * (d - reach), ahead) & vf_lt(zero, w);
+    const vm lit = vf_lt(zero, height) & vf_lt(c->reach * (d - reach), ahead) & vf_lt(zero, w);
     return vf_select(lit, vf_min(w, vf_set(1e30f)), zero);
 }
 
@@ -58,8 +58,8 @@ INLINE vi choose_cluster(const struct light_clusters *t, vec3v p, vec3v n, vf u,
     vf before = vf_set(0), there = sum;
     vi taken = vi_set(0);
     for (int i = 0; i < t->num; i++) {
-        vi beyond = vf_le(upto[i], target);
-        taken = taken - beyond;
+        vm beyond = vf_le(upto[i], target);
+        taken += vi_where(beyond, vi_set(1));
         before = vf_select(beyond, upto[i], before);
         there = vf_select(beyond, there, vf_min(there, upto[i]));
     }

@@ -43,23 +43,23 @@ struct light_samplev {
     rgbv radiance; /* arriving along wi; for delta lights irradiance on a plane facing wi */
     vi sphere; /* primitive number of the light if it is a sphere seen from outside, which a shadow ray then has to
                   ignore; else -1 */
-    vi delta; /* pdf_w is then 1 and no BSDF sample can find the light */
+    vm delta; /* pdf_w is then 1 and no BSDF sample can find the light */
     vf pdf_w; /* per steradian; 0: this sample brings no light */
 };
 
 INLINE struct light_samplev light_sample_none(void)
 {
-    return (struct light_samplev){.sphere = vi_set(-1), .delta = vi_set(0), .pdf_w = vf_set(0)};
+    return (struct light_samplev){.sphere = vi_set(-1), .delta = vm_set(false), .pdf_w = vf_set(0)};
 }
 
-INLINE struct light_samplev light_sample_select(vi mask, const struct light_samplev *yes,
+INLINE struct light_samplev light_sample_select(vm mask, const struct light_samplev *yes,
                                                 const struct light_samplev *no)
 {
     return (struct light_samplev){.wi = v3_select(mask, yes->wi, no->wi),
                                   .distance = vf_select(mask, yes->distance, no->distance),
                                   .radiance = rgb_select(mask, yes->radiance, no->radiance),
                                   .sphere = vi_select(mask, yes->sphere, no->sphere),
-                                  .delta = vi_select(mask, yes->delta, no->delta),
+                                  .delta = (mask & yes->delta) | (~mask & no->delta),
                                   .pdf_w = vf_select(mask, yes->pdf_w, no->pdf_w)};
 }
 
@@ -69,7 +69,7 @@ struct lamp {
     int count;
     vf pdf_a;
     rgbv radiance;
-    vi both_sides;
+    vm both_sides;
 };
 
 static inline struct lamp lamp_of(const struct light_table *t, uint32_t l)
@@ -79,7 +79,7 @@ static inline struct lamp lamp_of(const struct light_table *t, uint32_t l)
                          .count = (int)t->scene->lights[l].count,
                          .pdf_a = vf_set(row->pdf_a),
                          .radiance = rgb_all(row->radiance),
-                         .both_sides = vi_set(row->both_sides)};
+                         .both_sides = vm_set(row->both_sides)};
 }
 
 static inline bool is_lamp(const struct light *light)
@@ -97,7 +97,7 @@ INLINE void finish_area_sample(const struct lamp *l, vec3v from, vec3v to, vec3v
     s->distance = vf_sqrt(d2);
     s->wi = scalev(w, 1 / s->distance);
     vf cosine = dotv(normal, s->wi), cos_l = vf_abs(cosine);
-    vi lit = l->both_sides | vf_lt(cosine, zero);
+    vm lit = l->both_sides | vf_lt(cosine, zero);
     s->radiance = l->radiance;
     /* Of d2 = 0 comes NaN, which no comparison lets through. */
     lit &= vf_lt(zero, cos_l);
@@ -124,7 +124,7 @@ INLINE void sample_lamp(const struct lamp *l, vec3v p, const vf u[4], struct lig
     for (int k = 0; k < LAMP_AREA; k++)
         q[k] = vf_set(r[k]);
     for (int i = 0; i < l->count - 1; i++, r += LAMP_WORDS) {
-        vi beyond = vf_le(vf_set(r[LAMP_AREA]), target);
+        vm beyond = vf_le(vf_set(r[LAMP_AREA]), target);
         for (int k = 0; k < LAMP_AREA; k++)
             q[k] = vf_select(beyond, vf_set(r[LAMP_WORDS + k]), q[k]);
     }
@@ -176,7 +176,7 @@ INLINE unsigned sample_lamps(const struct light_table *t, const uint32_t light[L
     for (int i = 0; i < 2; i++)
         gather_columns(t->lamp + COLUMNS * i, LAMP_WORDS, number, q + COLUMNS * i);
     const struct lamp lamp = {
-        .radiance = {w[0], w[1], w[2]}, .pdf_a = w[3], .both_sides = as_vi(w[4])};
+        .radiance = {w[0], w[1], w[2]}, .pdf_a = w[3], .both_sides = vi_lt(as_vi(w[4]), vi_set(0))};
     sample_triangle(&lamp, q, p, u, out);
     return mask;
 }
@@ -212,7 +212,7 @@ INLINE vf cone_one_minus_cos(vf r2, vf d2)
 
 /* Lanes that are outside the sphere and not so near that the cone becomes a half space. These sample the cone, others
  * the area. */
-INLINE vi uses_cone(vf radius, vf d2)
+INLINE vm uses_cone(vf radius, vf d2)
 {
     return vf_lt(1.0001f * radius * radius, d2);
 }
@@ -224,7 +224,7 @@ INLINE void sample_sphere(const struct scene *s, const struct light *light, cons
     const vf zero = vf_set(0), radius = vf_set(sp->radius), r2 = radius * radius;
     vec3v to_centre = subv(v3_all(sp->centre), p);
     vf d2 = dotv(to_centre, to_centre);
-    vi cone = sp->normal_out > 0 ? uses_cone(radius, d2) : vi_set(0);
+    vm cone = sp->normal_out > 0 ? uses_cone(radius, d2) : vm_set(false);
     vf one_minus_cos = cone_one_minus_cos(r2, d2);
     framev f = frame_from_normalv(normalizev(to_centre));
     vec3v local = warp_uniform_cone(u[0], u[1], one_minus_cos);
@@ -251,7 +251,7 @@ INLINE void sample_point(const struct light *light, vec3v p, unsigned mask,
     vec3v w = subv(v3_all(light->position), p);
     vf d = vf_sqrt(dotv(w, w)), share = vf_set(1);
     const float *a = light->attenuation;
-    vi dark = vf_eq(d, vf_set(0));
+    vm dark = vf_eq(d, vf_set(0));
     out->wi = scalev(w, 1 / d);
     if (light->kind == LIGHT_SPOT) {
         vf cosine = -dotv(v3_all(light->axis), out->wi);
@@ -265,7 +265,7 @@ INLINE void sample_point(const struct light *light, vec3v p, unsigned mask,
     out->distance = d;
     out->radiance = rgb_scalev(rgb_all(light->value), share / (a[0] + d * (a[1] + d * a[2])));
     out->pdf_w = vf_select(dark, vf_set(0), vf_set(1));
-    out->delta = vi_set(-1);
+    out->delta = vm_set(true);
 }
 
 INLINE void sample_directional(const struct light *light, struct light_samplev *out)
@@ -274,7 +274,7 @@ INLINE void sample_directional(const struct light *light, struct light_samplev *
     out->distance = vf_set(INFINITY);
     out->radiance = rgb_all(light->value);
     out->pdf_w = vf_set(1);
-    out->delta = vi_set(-1);
+    out->delta = vm_set(true);
 }
 
 /* Turns a sample of ours into that of the assignment's starter code (cs184_deviations.h). */

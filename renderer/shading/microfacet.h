@@ -29,7 +29,7 @@ INLINE vf microfacet_d(vi kind, vf alpha, vec3v m)
     if (beckmann) {
         e = sin2 / (cos2 * a2);
         /* Beyond 87 the exponential is 0, and cos2 may be 0. */
-        vi near = vf_lt(e, vf_set(87));
+        vm near = vf_lt(e, vf_set(87));
         vf b = exp_negative(-e) * INV_PI_F / (a2 * cos2 * cos2);
         d = vf_select(lanes_of(beckmann), vf_select(near, b, vf_set(0)), d);
     }
@@ -42,7 +42,7 @@ INLINE vf microfacet_lambda(vi kind, vf alpha, vec3v w)
 {
     vf tan2 = (w.x * w.x + w.y * w.y) / (w.z * w.z);
     vf l = 0.5f * (vf_sqrt(1 + alpha * alpha * tan2) - 1);
-    vi upright = vf_eq(tan2, vf_set(0));
+    vm upright = vf_eq(tan2, vf_set(0));
     unsigned beckmann = microfacet_beckmanns(kind);
     if (beckmann) {
         vf a = 1 / (alpha * vf_sqrt(tan2));
@@ -63,7 +63,7 @@ INLINE vf microfacet_starter_lambda(vf alpha, vec3v w)
 /* Smith's G2, the fraction of facets visible from both wo and wi. Height-correlated: 1/(1 + lambda_o + lambda_i).
  * separable (a mask): the product of the two G1. MICROFACET_BECKMANN_STARTER: height-correlated with the starter code's
  * lambda, which has pi where sqrt(pi) belongs; that is more than 1 where both directions are near the normal. */
-INLINE vf microfacet_g2(vi kind, vf alpha, vi separable, vec3v wo, vec3v wi)
+INLINE vf microfacet_g2(vi kind, vf alpha, vm separable, vec3v wo, vec3v wi)
 {
     vf lo = microfacet_lambda(kind, alpha, wo), li = microfacet_lambda(kind, alpha, wi);
     vf g = vf_select(separable, 1 / ((1 + lo) * (1 + li)), 1 / (1 + lo + li));
@@ -118,13 +118,13 @@ INLINE vf microfacet_slope(unsigned lanes, vf t, vf u)
     x = vf_min(x, 0.9f * hi);
     vf all = microfacet_slope_integral(hi, t, exp_negative(-hi * hi));
     for (int i = 0; i < 30 && lanes; i++) {
-        const vi live = lanes_of(lanes);
+        const vm live = lanes_of(lanes);
         vf e = exp_negative(-x * x), f = microfacet_slope_integral(x, t, e) - u * all;
-        vi above = vf_lt(zero, f);
+        vm above = vf_lt(zero, f);
         hi = vf_select(above & live, x, hi);
         lo = vf_select(~above & live, x, lo);
         vf next = x - f / ((1 - x * t) * e);
-        vi last = vf_lt(vf_abs(next - x), vf_set(2e-4f));
+        vm last = vf_lt(vf_abs(next - x), vf_set(2e-4f));
         next = vf_select(last | (vf_lt(lo, next) & vf_lt(next, hi)), next, 0.5f * (lo + hi));
         lanes &= ~bits(last | vf_lt(hi - lo, vf_set(1e-6f)));
         x = vf_select(live, next, x);
@@ -138,7 +138,7 @@ INLINE vec3v microfacet_sample_beckmann(unsigned lanes, vf alpha, vec3v wo, vf u
     const vf zero = vf_set(0);
     vec3v w = v3v(alpha * wo.x, alpha * wo.y, wo.z);
     vf sin_w = vf_sqrt(w.x * w.x + w.y * w.y), t = sin_w / w.z;
-    vi slant = vf_lt(zero, sin_w);
+    vm slant = vf_lt(zero, sin_w);
     vf c = vf_select(slant, w.x / sin_w, vf_set(1)), s = vf_select(slant, w.y / sin_w, zero);
     vf along = microfacet_slope(lanes, t, u), across = microfacet_slope(lanes, zero, v);
     return normalizev(

@@ -47,12 +47,12 @@ INLINE unsigned scatter_towards(const struct integrator *it, const struct batch 
     mask &= bits(vf_lt(zero, cos_i) & vf_lt(zero, dotv(v->ng, wi)));
     *f = rgb_scalev(v->diffuse, cos_i);
     *pdf_w = warp_cosine_hemisphere_pdf_w(cos_i);
-    vi below = ~vf_lt(zero, dotv(v->wo, v->ns));
+    vm below = ~vf_lt(zero, dotv(v->wo, v->ns));
     if (only_diffuse)
         return mask & ~bits(below | rgb_is_zerov(*f));
     if (!mask)
         return 0;
-    vi diffuse = has_bits(v->bits, 1 << MATERIAL_DIFFUSE);
+    vm diffuse = has_bits(v->bits, 1 << MATERIAL_DIFFUSE);
     unsigned other = mask & ~bits(diffuse), black = bits(diffuse & below);
     if (other) {
         struct materialv m;
@@ -104,7 +104,7 @@ INLINE void load_lamp_sample(const struct batch *b, int j, const struct lamp *la
     ls->pdf_w = vf_load_any(b->shadow.tmin + LANES * j);
     ls->radiance = lamp->radiance;
     ls->sphere = vi_set(-1);
-    ls->delta = vi_set(0);
+    ls->delta = vm_set(false);
 }
 
 /* Samples the lights in b->choice: all lamps together, others one by one. */
@@ -120,7 +120,7 @@ static __attribute__((noinline)) void sample_chosen(const struct integrator *it,
         mask &= ~sample_lamps(it->lights, b->choice + k, p, u, mask, out);
     while (mask) {
         const uint32_t light = b->choice[k + __builtin_ctz(mask)];
-        const vi same = lanes_of(mask) & vi_eq(chosen, vi_set((int32_t)light));
+        const vm same = lanes_of(mask) & vi_eq(chosen, vi_set((int32_t)light));
         struct light_samplev one;
         sample_light_from(it->lights, light, p, n, u, bits(same), &one);
         *out = light_sample_select(same, &one, out);
@@ -316,8 +316,8 @@ static __attribute__((noinline)) void connect_hemisphere(const struct integrator
             continue;
         struct surfacev at;
         surfaces(it, &b->shadow, &b->shadow_hit, k, &at);
-        vi missed = vi_eq(vi_load_any(b->shadow_hit.prim + k), vi_set(-1));
-        vi lit = ~missed & vi_lt(vi_set(-1), at.light);
+        vm missed = vi_eq(vi_load_any(b->shadow_hit.prim + k), vi_set(-1));
+        vm lit = ~missed & vi_lt(vi_set(-1), at.light);
         rgbv le = emitted(s, &at, &b->shadow_hit, k, d, cast & bits(lit));
         if (s->environment != NULL) {
             le = rgb_select(missed,

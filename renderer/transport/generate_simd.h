@@ -70,10 +70,10 @@ static __attribute__((noinline)) void show_normals(const struct integrator *it, 
     const vf zero = vf_set(0);
     for (int k = 0; k < n; k += LANES) {
         vi prim = vi_load_any(b->hit.prim + k);
-        vi flat = vi_lt(vi_set(-1), prim) & vi_lt(prim, vi_set((int32_t)s->num_triangles));
+        vm flat = vi_lt(vi_set(-1), prim) & vi_lt(prim, vi_set((int32_t)s->num_triangles));
         rgbv c = {zero, zero, zero};
         if (bits(flat)) {
-            vec3v ns = triangle_normals(s, b, k, prim & flat);
+            vec3v ns = triangle_normals(s, b, k, vi_where(flat, prim));
             c = rgb_select(flat, (rgbv){0.5f + 0.5f * ns.x, 0.5f + 0.5f * ns.y, 0.5f + 0.5f * ns.z},
                            c);
         }

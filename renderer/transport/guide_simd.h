@@ -16,10 +16,11 @@ INLINE vi guide_place(const struct guide *g, vec3v p, vec3v n)
     vi y = vi_truncate(vf_min(vf_max(at.y * g->cells_per_unit.y, zero), most));
     vi z = vi_truncate(vf_min(vf_max(at.z * g->cells_per_unit.z, zero), most));
     vf ax = vf_abs(n.x), ay = vf_abs(n.y), az = vf_abs(n.z);
-    vi is_x = vf_lt(ay, ax) & vf_lt(az, ax), is_y = ~is_x & vf_lt(az, ay);
+    vm is_x = vf_lt(ay, ax) & vf_lt(az, ax), is_y = ~is_x & vf_lt(az, ay);
     vi sign = vi_select(is_x, as_vi(n.x), vi_select(is_y, as_vi(n.y), as_vi(n.z)));
-    vi kind = (is_x & vi_set(4)) + (is_y & vi_set(8));
-    kind += (vi_lt(sign, vi_set(0)) & vi_set(2)) + (vi_lt(as_vi(n.z), vi_set(0)) & vi_set(1));
+    vi kind = vi_where(is_x, vi_set(4)) + vi_where(is_y, vi_set(8));
+    kind += vi_where(vi_lt(sign, vi_set(0)), vi_set(2)) +
+            vi_where(vi_lt(as_vi(n.z), vi_set(0)), vi_set(1));
     return ((z * GUIDE_CELLS + y) * GUIDE_CELLS + x) * GUIDE_CLASSES + kind;
 }
 
@@ -35,10 +36,10 @@ INLINE vf guide_bin(const float *table, vi row, vf *u, vi *bin)
     vf low = vf_set(0), high = end[0];
     *bin = vi_set(0);
     for (int k = 0; k + 1 < COLUMNS; k++) {
-        vi past = vf_le(end[k], *u);
+        vm past = vf_le(end[k], *u);
         low = vf_select(past, end[k], low);
         high = vf_select(past, end[k + 1], high);
-        *bin -= past;
+        *bin += vi_where(past, vi_set(1));
     }
     vf width = high - low;
     *u = vf_min((vf_of_int(*bin) + (*u - low) / width) * (1.0f / COLUMNS), below_one);

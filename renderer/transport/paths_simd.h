@@ -73,7 +73,7 @@ INLINE void load_numbers(const struct batch *b, int row, vf u[4])
 }
 
 /* Adds light to what the paths k .. of the mask have gathered. */
-INLINE void gather_light(struct batch *b, int k, vi mask, rgbv light)
+INLINE void gather_light(struct batch *b, int k, vm mask, rgbv light)
 {
     rgb_store(&b->gathered, k, rgb_addv(rgb_load(&b->gathered, k), rgb_where(mask, light)));
 }

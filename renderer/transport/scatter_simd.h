@@ -55,7 +55,7 @@ static __attribute__((noinline)) void guide(const struct integrator *it, struct 
 {
     for (int k = 0; k < n; k += LANES) {
         unsigned mask = b->goes_on[k / LANES];
-        vi diffuse = lanes_of(mask) & has_bits(vi_load_any(b->bits + k), 1 << MATERIAL_DIFFUSE);
+        vm diffuse = lanes_of(mask) & has_bits(vi_load_any(b->bits + k), 1 << MATERIAL_DIFFUSE);
         if (!bits(diffuse))
             continue;
         vf old[2] = {vf_load_any(b->numbers[0] + k), vf_load_any(b->numbers[1] + k)};
@@ -97,13 +97,13 @@ static int scatter(const struct integrator *it, struct batch *b, int n, int vert
                      u, &s);
         vec3v wi = frame_to_worldv(&f, s.wi);
         /* Both normals have to agree on which side the light leaves. */
-        vi ok = vf_lt(zero, s.pdf_w) & vf_lt(zero, s.wi.z * dotv(v3_load(&b->ng, k), wi));
+        vm ok = vf_lt(zero, s.pdf_w) & vf_lt(zero, s.wi.z * dotv(v3_load(&b->ng, k), wi));
         if (only_delta)
             ok &= s.delta;
         rgbv throughput = rgb_mulv(rgb_load(&b->throughput, k), s.weight);
         vf eta2 = vf_load_any(b->eta2 + k) * s.eta2;
         vf go_on = survival(&it->opt, vertex, throughput, eta2);
-        vi at_risk = vf_lt(go_on, vf_set(1));
+        vm at_risk = vf_lt(go_on, vf_set(1));
         ok &= ~at_risk | vf_lt(u[3], go_on);
         throughput = rgb_scalev(throughput, vf_select(at_risk, 1 / go_on, vf_set(1)));
         mask &= bits(ok);

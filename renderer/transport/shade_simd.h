@@ -37,7 +37,7 @@ INLINE void surfaces(const struct integrator *it, const struct rays *r, const st
     s->light = as_vi(w[2][RECORD_LIGHT - 2 * COLUMNS]);
     if (!ls->has_spheres)
         return;
-    vi sphere = ~vi_lt(prim, vi_set((int32_t)it->scene->num_triangles));
+    vm sphere = ~vi_lt(prim, vi_set((int32_t)it->scene->num_triangles));
     if (!bits(sphere))
         return;
     vec3v n, centre = v3v(w[0][0], w[0][1], w[0][2]);
@@ -64,7 +64,7 @@ INLINE rgbv emitted(const struct scene *scene, const struct surfacev *s, const s
                                                       h->u[k + i], h->v[k + i]));
         rgb_set_lane(&le, i, radiance);
     }
-    vi front = vf_lt(vf_set(0), dotv(s->ng, negv(d)));
+    vm front = vf_lt(vf_set(0), dotv(s->ng, negv(d)));
     return rgb_where(lanes_of(both_sides) | front, le);
 }
 
@@ -81,7 +81,7 @@ INLINE vf emission_weight(const struct integrator *it, const struct batch *b, in
                           const int32_t light[LANES], const struct surfacev *s, vf pdf_light)
 {
     const vf one = vf_set(1), pdf_w = vf_load_any(b->pdf_w + k);
-    vi certain = vf_eq(pdf_w, vf_set(0));
+    vm certain = vf_eq(pdf_w, vf_set(0));
     if (it->opt.direct == DIRECT_BSDF)
         return one;
     if (it->opt.direct != DIRECT_MIS)
@@ -177,7 +177,7 @@ static void shade(const struct integrator *it, struct batch *b, int n, int verte
         vi about = as_vi(material[MATERIAL_BITS]);
         b->goes_on[k / LANES] = (uint16_t)(there & ~bits(has_bits(about, MATERIAL_IS_BLACK)));
         vec3v wo = negv(v3_load(&b->ray.d, k));
-        vi front = vf_lt(vf_set(0), dotv(s.ng, wo));
+        vm front = vf_lt(vf_set(0), dotv(s.ng, wo));
         s.ng = v3_negate_if(~front, s.ng);
         s.ns = v3_negate_if(~front, s.ns);
         /* A shading normal that faces away from the viewer is replaced by the geometric one. */
