@@ -49,7 +49,15 @@ struct light_samplev {
 
 INLINE struct light_samplev light_sample_none(void)
 {
-    return (struct light_samplev){.sphere = vi_set(-1), .delta = vm_set(false), .pdf_w = vf_set(0)};
+    const vf zero = vf_set(0);
+    struct light_samplev
+        none; /* member by member: compilers clear a whole structure by a loop of bytes */
+    none.wi = v3v(zero, zero, zero);
+    none.radiance = (rgbv){zero, zero, zero};
+    none.distance = none.pdf_w = zero;
+    none.sphere = vi_set(-1);
+    none.delta = vm_set(false);
+    return none;
 }
 
 INLINE struct light_samplev light_sample_select(vm mask, const struct light_samplev *yes,

@@ -73,7 +73,7 @@ struct light_samples {
     int num, count;   /* samples of this call, and of a vertex in all */
     bool chosen;      /* of the light in b->choice, else of `light` */
     uint32_t light;
-    struct lamp lamp; /* `light`, in the simple case of connect_light() */
+    struct lamp lamp; /* `light`, if connect_light() samples it in rows */
 };
 
 /* Samples the lamp for the vertices first .. end-1 and stores the samples, in rows of LANES, where their shadow rays
@@ -161,19 +161,20 @@ INLINE vf shadow_end(vf distance, vf eps)
  * to the `rays` that there are, and stores what they bring in row j. Returns the lanes that cast one. */
 INLINE unsigned connect_once(const struct integrator *it, struct batch *b, int k,
                              const struct vertexv *v, unsigned mask,
-                             const struct light_samples *what, bool simple, int j, int rays)
+                             const struct light_samples *what, bool in_rows, bool only_diffuse,
+                             int j, int rays)
 {
     vf pdf_bsdf;
     struct light_samplev ls;
-    if (simple)
+    if (in_rows)
         load_lamp_sample(b, j, &what->lamp, &ls);
     else
         mask = sample_light(it, b, k, v, mask, what, j, &ls);
     mask &= bits(vf_lt(vf_set(0), ls.pdf_w));
     rgbv f;
-    mask = scatter_towards(it, b, k, v, mask, ls.wi, simple, &f, &pdf_bsdf);
+    mask = scatter_towards(it, b, k, v, mask, ls.wi, only_diffuse, &f, &pdf_bsdf);
     /* Without a branch where there is little to save. */
-    if (!simple && !mask)
+    if (!only_diffuse && !mask)
         return 0;
     vf per = (float)what->count * ls.pdf_w, w = vf_set(1);
     if (it->opt.direct == DIRECT_MIS)
@@ -201,9 +202,10 @@ INLINE void add_visible(struct batch *b, int k, int j, int num)
     rgb_store(&b->gathered, k, g);
 }
 
-/* Casts the shadow rays of lanes first .. end-1; returns how many. */
+/* Casts the shadow rays of lanes first .. end-1; returns how many. in_rows: of samples by sample_lamp_rows();
+ * only_diffuse: all materials are. */
 INLINE int connect_rows(const struct integrator *it, struct batch *b, int first, int end,
-                        const struct light_samples *what, bool simple)
+                        const struct light_samples *what, bool in_rows, bool only_diffuse)
 {
     int rays = 0, j = 0;
     for (int k = first; k < end; k += LANES) {
@@ -211,13 +213,34 @@ INLINE int connect_rows(const struct integrator *it, struct batch *b, int first,
         struct vertexv v;
         load_vertex(b, k, &v);
         for (int i = 0; i < what->num; i++, j++) {
-            unsigned cast = mask ? connect_once(it, b, k, &v, mask, what, simple, j, rays) : 0;
+            unsigned cast =
+                mask ? connect_once(it, b, k, &v, mask, what, in_rows, only_diffuse, j, rays) : 0;
             b->shadow_bits[j] = (uint16_t)cast;
             b->shadow_first[j] = (uint16_t)rays;
             rays += __builtin_popcount(cast);
         }
     }
     return rays;
+}
+
+/* The three cases of connect_rows(), each compiled by itself: in one function they would share registers. */
+static __attribute__((noinline)) int connect_any(const struct integrator *it, struct batch *b,
+                                                 int first, int end,
+                                                 const struct light_samples *what)
+{
+    return connect_rows(it, b, first, end, what, false, false);
+}
+static __attribute__((noinline)) int connect_lamp(const struct integrator *it, struct batch *b,
+                                                  int first, int end,
+                                                  const struct light_samples *what)
+{
+    return connect_rows(it, b, first, end, what, true, false);
+}
+static __attribute__((noinline)) int connect_lamp_diffuse(const struct integrator *it,
+                                                          struct batch *b, int first, int end,
+                                                          const struct light_samples *what)
+{
+    return connect_rows(it, b, first, end, what, true, true);
 }
 
 /* True if only delta lights are sampled; other emitters are then found by directions. */
@@ -256,9 +279,8 @@ static void connect_light(const struct integrator *it, struct batch *b, int n, i
                           struct light_samples what)
 {
     const struct light *light = &it->scene->lights[what.light];
-    const bool simple =
-        !what.chosen && is_lamp(light) && it->records->only_diffuse && it->scene->starter == 0;
-    if (simple)
+    const bool in_rows = !what.chosen && is_lamp(light) && it->scene->starter == 0;
+    if (in_rows)
         what.lamp = lamp_of(it->lights, what.light);
     const int most = BATCH_LANES / LANES / what.num * LANES;
     const int used = !what.chosen && light->kind == LIGHT_TRIANGLES ? 3 : 4;
@@ -268,10 +290,11 @@ static void connect_light(const struct integrator *it, struct batch *b, int n, i
                      (struct draws){vertex + 1, what.purpose, what.num, .used = used});
         if (what.chosen)
             choose(it, b, n);
-        if (simple)
+        if (in_rows)
             sample_lamp_rows(b, first, end, &what);
-        int rays = simple ? connect_rows(it, b, first, end, &what, true)
-                          : connect_rows(it, b, first, end, &what, false);
+        int rays = !in_rows                    ? connect_any(it, b, first, end, &what)
+                   : it->records->only_diffuse ? connect_lamp_diffuse(it, b, first, end, &what)
+                                               : connect_lamp(it, b, first, end, &what);
         bvh_occluded(it->bvh, &b->shadow, b->active, rays, b->occluded, &b->stats);
         for (int k = first, j = 0; k < end; k += LANES, j += what.num)
             add_visible(b, k, j, what.num);
