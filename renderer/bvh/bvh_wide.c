@@ -5,6 +5,7 @@
 #include "traverse.h"
 #include "wide_build.h"
 
+#include <assert.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -274,6 +275,7 @@ struct wide *wide_build(const struct scene *s, enum isa isa, int threads, struct
     if (w == NULL)
         goto fail;
     w->kernel = code[isa].kernel;
+    assert(w->kernel != NULL);
     w->width = b.parts.width = w->kernel->width;
     w->list = code[isa].list;
     w->num_triangles = s->num_triangles;
