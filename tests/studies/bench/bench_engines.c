@@ -11,8 +11,9 @@
 #include <sys/resource.h>
 
 const char *const bench_engine_names[BENCH_NUM_ENGINES] = {
-    [BENCH_LIGHT] = "ours, light", [BENCH_MIS] = "ours, mis", [BENCH_SOBOL] = "ours, sobol",
-    [BENCH_EMBREE] = "on Embree",  [BENCH_CYCLES] = "Cycles", [BENCH_POVRAY] = "POV-Ray"};
+    [BENCH_LIGHT] = "ours, light",  [BENCH_MIS] = "ours, mis",    [BENCH_SOBOL] = "ours, sobol",
+    [BENCH_GUIDED] = "ours, guided", [BENCH_EMBREE] = "on Embree", [BENCH_CYCLES] = "Cycles",
+    [BENCH_POVRAY] = "POV-Ray"};
 
 /* User and system time of this process and of the children that it has waited for. */
 static double all_cpu_seconds(void)
@@ -37,8 +38,10 @@ static bool render_ours(enum bench_engine engine, const struct bench_view *v, in
                        .light_samples = 1,
                        .roulette = ROULETTE_THROUGHPUT,
                        .isa = v->isa,
-                       .guiding = engine == BENCH_SOBOL,
-                       .sampler = {engine == BENCH_SOBOL ? SAMPLER_SOBOL : SAMPLER_INDEPENDENT,
+                       .guiding = engine == BENCH_GUIDED,
+                       .sampler = {engine == BENCH_SOBOL || engine == BENCH_GUIDED
+                                       ? SAMPLER_SOBOL
+                                       : SAMPLER_INDEPENDENT,
                                    seed}},
         .width = v->camera.width,
         .height = v->camera.height,
@@ -106,6 +109,7 @@ bool bench_engine_render(enum bench_engine engine, const struct bench_view *v, i
     case BENCH_LIGHT:
     case BENCH_MIS:
     case BENCH_SOBOL:
+    case BENCH_GUIDED:
         for (int k = 0; ok && k < count; k++)
             ok = render_ours(engine, v, spp, replicate_seed(seed, k), images + (size_t)k * size, e);
         break;
