@@ -1,5 +1,6 @@
 #include "guide.h"
 
+#include "renderer/base/huge_alloc.h"
 #include "renderer/base/parallel.h"
 
 #include <math.h>
@@ -119,28 +120,32 @@ void guide_tabulate(const double sum[GUIDE_BINS], const double count[GUIDE_BINS]
         cumulate(weight + x * GUIDE_SIDE, table + (1 + x) * GUIDE_SIDE);
 }
 
+/* What a place has been taught: sums of L^2 by bins, and their numbers. */
+struct taught {
+    double sum[GUIDE_BINS], count[GUIDE_BINS];
+};
+
 /* Lessons are added in their order, whoever learned them. */
-static void tabulate_all(const struct pilot *t, size_t num, double *sum, double *count,
-                         float *table)
+static void tabulate_all(const struct pilot *t, size_t num, struct taught *places, float *table)
 {
     for (size_t i = 0; i < num; i++) {
         const struct lesson *l = &t->lessons[i];
         if (l->bin < 0)
             continue;
-        sum[l->bin] += (double)l->light * (double)l->light;
-        count[l->bin]++;
+        struct taught *of = &places[l->bin / GUIDE_BINS];
+        of->sum[l->bin % GUIDE_BINS] += (double)l->light * (double)l->light;
+        of->count[l->bin % GUIDE_BINS]++;
     }
     static const double nothing[GUIDE_BINS] = {0};
     float uniform[GUIDE_ROWS * GUIDE_SIDE];
     guide_tabulate(nothing, nothing, uniform);
     for (size_t p = 0; p < GUIDE_PLACES; p++) {
-        const double *taught = count + p * GUIDE_BINS;
         float *of = table + p * GUIDE_ROWS * GUIDE_SIDE;
         double directions = 0;
         for (int k = 0; k < GUIDE_BINS; k++)
-            directions += taught[k];
+            directions += places[p].count[k];
         if (directions > 0)
-            guide_tabulate(sum + p * GUIDE_BINS, taught, of);
+            guide_tabulate(places[p].sum, places[p].count, of);
         else
             memcpy(of, uniform, sizeof uniform);
     }
@@ -152,25 +157,24 @@ struct guide *guide_learn(const struct integrator *it, int threads, struct err *
     const uint64_t pixels = (uint64_t)it->camera->width * (uint64_t)it->camera->height;
     const uint64_t paths =
         pixels < GUIDE_PATHS / GUIDE_SAMPLES ? GUIDE_SAMPLES * pixels : GUIDE_PATHS;
-    const size_t batches = (paths + BATCH_LANES - 1) / BATCH_LANES,
-                 bins = (size_t)GUIDE_PLACES * GUIDE_BINS;
+    const size_t batches = (paths + BATCH_LANES - 1) / BATCH_LANES;
     const size_t lessons = batches * BATCH_LANES * GUIDE_VERTICES;
     struct guide *g = calloc(1, sizeof *g);
-    double *sum = calloc(bins, sizeof *sum), *count = calloc(bins, sizeof *count);
+    struct taught *places = huge_calloc(GUIDE_PLACES, sizeof *places);
     struct pilot t = {.it = *it,
                       .pixels = pixels,
                       .apart = pixels < paths ? pixels : paths,
-                      .lessons = malloc(lessons * sizeof *t.lessons)};
+                      .lessons = huge_alloc(lessons * sizeof *t.lessons)};
     if (g != NULL)
-        g->table = malloc((size_t)GUIDE_PLACES * GUIDE_ROWS * GUIDE_SIDE * sizeof *g->table);
-    bool ok = g != NULL && g->table != NULL && sum != NULL && count != NULL && t.lessons != NULL;
+        g->table = huge_alloc((size_t)GUIDE_PLACES * GUIDE_ROWS * GUIDE_SIDE * sizeof *g->table);
+    bool ok = g != NULL && g->table != NULL && places != NULL && t.lessons != NULL;
     if (ok) {
         const vec3 size = sub(s->bounds_max, s->bounds_min);
         g->low = s->bounds_min;
         g->cells_per_unit =
             v3(size.x > 0 ? GUIDE_CELLS / size.x : 0, size.y > 0 ? GUIDE_CELLS / size.y : 0,
                size.z > 0 ? GUIDE_CELLS / size.z : 0);
-        tabulate_all(&t, 0, sum, count, g->table);
+        tabulate_all(&t, 0, places, g->table);
         t.it.guide = g;
         t.it.opt.sampler.seed ^= pilot_seed_mask;
         t.it.opt.first_hits = false;
@@ -180,7 +184,7 @@ struct guide *guide_learn(const struct integrator *it, int threads, struct err *
         ok = !t.out_of_memory;
     }
     if (ok) {
-        tabulate_all(&t, lessons, sum, count, g->table);
+        tabulate_all(&t, lessons, places, g->table);
         g->paths = (double)(batches * BATCH_LANES);
         g->rays = t.rays;
     } else {
@@ -189,8 +193,7 @@ struct guide *guide_learn(const struct integrator *it, int threads, struct err *
         g = NULL;
     }
     free(t.lessons);
-    free(sum);
-    free(count);
+    free(places);
     return g;
 }
 
