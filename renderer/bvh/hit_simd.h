@@ -24,7 +24,8 @@ INLINE vm sheared_hit(const vf x[3], const vf y[3], const vf z[3], vf sz, vf *t,
     vf e1 = x[2] * y[0] - y[2] * x[0];
     vf e2 = x[0] * y[1] - y[0] * x[1];
     const vf zero = vf_set(0);
-    vm pass = ~(vf_lt(vf_min(vf_min(e0, e1), e2), zero) & vf_lt(zero, vf_max(vf_max(e0, e1), e2)));
+    /* Such that NaNs, of which a leaf's empty lanes consist, do not pass: most leaves have some. */
+    vm pass = vf_le(zero, vf_min(vf_min(e0, e1), e2)) | vf_le(vf_max(vf_max(e0, e1), e2), zero);
     if (!bits(pass))
         return pass;
     if (__builtin_expect(bits(pass & (vf_eq(e0, zero) | vf_eq(e1, zero) | vf_eq(e2, zero))) != 0,
@@ -32,7 +33,7 @@ INLINE vm sheared_hit(const vf x[3], const vf y[3], const vf z[3], vf sz, vf *t,
         edge_exact(&x[1], &y[1], &x[2], &y[2], &e0);
         edge_exact(&x[2], &y[2], &x[0], &y[0], &e1);
         edge_exact(&x[0], &y[0], &x[1], &y[1], &e2);
-        pass = ~(vf_lt(vf_min(vf_min(e0, e1), e2), zero) & vf_lt(zero, vf_max(vf_max(e0, e1), e2)));
+        pass = vf_le(zero, vf_min(vf_min(e0, e1), e2)) | vf_le(vf_max(vf_max(e0, e1), e2), zero);
     }
     /* Without area the inverse is infinite and t is NaN, which fails every comparison. */
     vf inv = 1 / (e0 + e1 + e2);
