@@ -1,5 +1,5 @@
 /* Ray queries, the nearest hit and occlusion, over all primitives of a scene: by brute force, or by
- * a bounding volume hierarchy, binary or eight wide. Rays come in batches, so that vector kernels
+ * a bounding volume hierarchy, binary or wide. Rays come in batches, so that vector kernels
  * fit behind the same interface. */
 #ifndef ASSAY_BVH_H
 #define ASSAY_BVH_H
@@ -12,11 +12,11 @@ enum bvh_kind {
     BVH_BRUTE_FORCE, /* every primitive for every ray: the oracle */
     BVH_CENTROID,    /* the assignment's: split the longest axis at the mean centroid */
     BVH_SAH,         /* binned surface area heuristic [Wald07] */
-    BVH_WIDE         /* eight wide, by vector kernels (bvh_wide.h) */
+    BVH_WIDE         /* eight or sixteen wide, by vector kernels (bvh_wide.h) */
 };
 
-/* What the rays of one thread cost. BVH_WIDE counts nodes and leaves (of up to eight boxes or
- * primitives); a packet's visit counts once. */
+/* What the rays of one thread cost. BVH_WIDE counts nodes and leaves (of as many boxes or
+ * primitives as its kernels have lanes); a visit of a packet counts once. */
 struct bvh_stats {
     uint64_t rays, box_tests, primitive_tests;
 };
