@@ -135,6 +135,36 @@ TEST(test_false_alarms)
     free_world(&w);
 }
 
+/* Each stage may say EQUIVALENT by its 1 - 2 (alpha/2) interval, so its half width is the quantile of Student's law
+ * at alpha/2 standard errors, here 2.58; at alpha it would be 2.33, at alpha/4 2.81. Widening for the skew of 64 normal
+ * pixels of 64 samples adds less than 0.05. */
+TEST(test_level_of_intervals)
+{
+    struct world w = new_world();
+    const struct compare_options opt = {.alpha = 0.01, .tile = SIDE};
+    struct comparison first, second;
+    uint64_t seed = 5;
+    struct err e;
+    paint(&w, 64, 1, 1, &seed);
+    MUST(two_stage_first(&w.a, &w.b, &opt, &first, &e));
+    assert_int_not_equal(first.verdict, VERDICT_DIFFERENT);
+    paint(&w, 64, 1.2, 1, &seed);
+    struct comparison flagged;
+    MUST(two_stage_first(&w.a, &w.b, &opt, &flagged, &e));
+    assert_int_equal(flagged.verdict, VERDICT_DIFFERENT);
+    MUST(two_stage_confirm(&flagged, &w.a2, &w.b2, &opt, &second, &e));
+    const struct region *image[] = {&first.global[3], &second.global[3]};
+    for (int i = 0; i < 2; i++) {
+        double half = (image[i]->ci_hi - image[i]->ci_lo) / (2 * image[i]->std_error);
+        assert_true(image[i]->ci_valid);
+        assert_true(fabs(half - gsl_cdf_tdist_Qinv(opt.alpha / 2, image[i]->dof)) < 0.1);
+    }
+    comparison_free(&first);
+    comparison_free(&flagged);
+    comparison_free(&second);
+    free_world(&w);
+}
+
 TEST(test_check_fresh)
 {
     struct world w = new_world();
