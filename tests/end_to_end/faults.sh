@@ -332,7 +332,7 @@ comma() {
             "$assay" export -o a.pov "$scene" && "$assay" compare --margin 0.01 a.exr b.exr
             "$pathtracer" -q -s 16 -m 1 -r 64 64 -f right/point.png "$root/reference/scenes/12_point_plane.dae"
             "$assay" grade -q -o grades "$root/tests/end_to_end/quick.rubric" right; cat grades/grades.csv
-            "$assay" validate -q --only 12_point_plane -o suite | sed 's/[0-9.]*e+0[0-9] */TIMED /') >"$tmp/comma/$at.out" 2>&1
+            "$assay" validate -q --only 12_point_plane -o suite | sed -E 's/[0-9.]+e\+0[0-9]( \[[^]]*\])?/TIMED/; s/  +/ /g') >"$tmp/comma/$at.out" 2>&1
     done
     unset LOCPATH
     for at in a.exr.state a.png a.pov; do cmp "$tmp/comma/C/$at" "$tmp/comma/de_DE.UTF-8/$at" >>"$tmp/comma/why" 2>&1 || why="${why:-$at: $(cat "$tmp/comma/why")}"; done
