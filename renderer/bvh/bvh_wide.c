@@ -72,6 +72,12 @@ static bool is_sphere(const struct build *b, uint32_t item)
     return b->item[item].prim >= b->scene->num_triangles;
 }
 
+/* Row `row` of the node or leaf at a place of the arena (bvh_wide.h). */
+static void *row_of(const struct wide *w, size_t place, uint32_t row)
+{
+    return w->arena + place + sizeof(float) * row * w->width;
+}
+
 static void set_corner(float *to, uint32_t width, vec3 p)
 {
     to[0] = p.x;
@@ -84,8 +90,8 @@ static void fill_leaf(const struct build *b, const struct empty_leaf *leaf)
     const struct scene *s = b->scene;
     const struct wide_item *item = b->item + leaf->first;
     const uint32_t width = b->w->width, count = leaf->count;
-    float *corner = (float *)(b->w->arena + leaf->place);
-    uint32_t *number = (uint32_t *)(corner + 9 * (size_t)width);
+    float *corner = row_of(b->w, leaf->place, 0);
+    uint32_t *number = row_of(b->w, leaf->place, 9);
     for (uint32_t i = 0; i < 9 * width; i++)
         corner[i] = NAN;
     for (uint32_t i = 0; i < width; i++)
@@ -158,13 +164,13 @@ static bool add_node(struct build *b, uint32_t i, int depth)
     if (depth > w->depth)
         w->depth = depth;
     w->cost += chance(b, &part[i].box);
-    const int width = (int)w->width;
-    float *plane = (float *)(w->arena + place);
-    for (int a = 0; a < 3; a++, plane += 2 * width)
-        for (int k = 0; k < width; k++) {
-            plane[k] = k < n ? part[child[k]].box.v[a] : INFINITY;
-            plane[width + k] = k < n ? -part[child[k]].box.v[4 + a] : -INFINITY;
+    for (uint32_t a = 0; a < 3; a++) {
+        float *low = row_of(w, place, 2 * a), *high = row_of(w, place, 2 * a + 1);
+        for (int k = 0; k < (int)w->width; k++) {
+            low[k] = k < n ? part[child[k]].box.v[a] : INFINITY;
+            high[k] = k < n ? -part[child[k]].box.v[4 + a] : -INFINITY;
         }
+    }
     /* Leaves are stored right after their node. */
     for (int k = 0; k < n; k++) {
         const struct wide_part *c = &part[child[k]];
@@ -181,7 +187,7 @@ static bool add_node(struct build *b, uint32_t i, int depth)
             if (!add_node(b, child[k], depth + 1))
                 return false;
         }
-    memcpy(w->arena + place + sizeof *plane * 6 * w->width, ref, sizeof *ref * w->width);
+    memcpy(row_of(w, place, 6), ref, sizeof *ref * w->width);
     return true;
 }
 

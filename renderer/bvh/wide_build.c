@@ -100,8 +100,8 @@ static void best_slots(struct build *b, uint32_t i)
     struct wide_part *p = &b->parts->part[i];
     const struct wide_part *l = &b->parts->part[p->left], *r = l + 1;
     const uint32_t width = b->parts->width;
-    float split[WIDE_MOST + 1];
-    uint8_t left[WIDE_MOST + 1];
+    float split[WIDE_MOST + 1] = {0};
+    uint8_t left[WIDE_MOST + 1] = {0};
     for (uint32_t n = 2; n <= width; n++) {
         split[n] = INFINITY;
         left[n] = 1; /* costs that are infinite or not numbers are as good as each other */
