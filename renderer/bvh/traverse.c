@@ -4,7 +4,8 @@
 #include "traverse_packet.h"
 #include "traverse_single.h"
 
-/* Traces one batch: rays that are alike go in packets, the others one by one. h NULL: tests occlusion. */
+/* Traces one batch: rays that are alike go in packets, the others one by one, as do all in a tree so large that they go
+ * in turns, whose triangles are smaller than the rays' distance. h NULL: tests occlusion. */
 INLINE void trace(const struct wide *w, const struct rays *r, const uint16_t *lane, int num_lanes,
                   struct hits *h, bool *occluded, struct bvh_stats *stats)
 {
@@ -21,7 +22,7 @@ INLINE void trace(const struct wide *w, const struct rays *r, const uint16_t *la
         else if (w->flat != NULL)
             rayv_go_on(h, of, o);
         rayv_slabs(w, o);
-        if (full && are_alike(w, o)) {
+        if (full && !w->in_turns && are_alike(w, o)) {
             struct packet p;
             struct bundle b;
             packet_init(o, &p);

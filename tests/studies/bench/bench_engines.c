@@ -11,7 +11,7 @@
 #include <sys/resource.h>
 
 const char *const bench_engine_names[BENCH_NUM_ENGINES] = {
-    [BENCH_LIGHT] = "ours, light",  [BENCH_MIS] = "ours, mis",    [BENCH_SOBOL] = "ours, sobol",
+    [BENCH_LIGHT] = "ours, light",   [BENCH_MIS] = "ours, mis",    [BENCH_SOBOL] = "ours, sobol",
     [BENCH_GUIDED] = "ours, guided", [BENCH_EMBREE] = "on Embree", [BENCH_CYCLES] = "Cycles",
     [BENCH_POVRAY] = "POV-Ray"};
 

@@ -12,7 +12,7 @@ enum bench_engine {
     BENCH_MIS,    /* ours, --direct mis, the default: as Cycles */
     BENCH_SOBOL,  /* the same with --sampler sobol */
     BENCH_GUIDED, /* and with --guiding on */
-    BENCH_EMBREE, /* embree_tracer.h; the last that renders in this process */
+    BENCH_EMBREE, /* embree_tracer.h */
     BENCH_CYCLES,
     BENCH_POVRAY, /* bench_povray.c; spp is a square */
     BENCH_NUM_ENGINES

@@ -1,8 +1,7 @@
 /* Paths per CPU second, relMSE, and 1/(relMSE x CPU seconds), of our renderer, of a tracer on Embree,
  * of Cycles and of POV-Ray: the same view, one thread. Each engine renders images of FEW and of MANY
- * samples in turn. What a sample costs Cycles and POV-Ray is the slope between the two, so no start is
- * counted; those that render in this process have none, and the pilot of --guiding counts. Image means have
- * to agree first.
+ * samples in turn. What a sample costs is the slope between the two, so no start is counted; with guiding,
+ * whose pilot counts, the time of an image of MANY over their number. Image means have to agree first.
  *
  * POV-Ray is slow by the recipe that makes its image ours: it renders the view with a quarter of the
  * pixels, and fewer samples. */
@@ -135,9 +134,9 @@ static bool run(enum bench_engine engine, const struct bench_options *o, const s
                                  r->images[k] + (size_t)(round * COUNT) * size, &cpu[k], e))
             return false;
     }
-    const bool in_process = engine <= BENCH_EMBREE;
-    double seconds = in_process ? cpu[MANY] : cpu[MANY] - cpu[FEW];
-    int spp = in_process ? r->spp[MANY] : r->spp[MANY] - r->spp[FEW];
+    const bool whole = engine == BENCH_GUIDED;
+    double seconds = whole ? cpu[MANY] : cpu[MANY] - cpu[FEW];
+    int spp = whole ? r->spp[MANY] : r->spp[MANY] - r->spp[FEW];
     r->cost[round] = seconds / (COUNT * spp) * r->shrink * r->shrink;
     return true;
 }
