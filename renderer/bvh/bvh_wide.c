@@ -73,9 +73,9 @@ static bool is_sphere(const struct build *b, uint32_t item)
 }
 
 /* Row `row` of the node or leaf at a place of the arena (bvh_wide.h). */
-static void *row_of(const struct wide *w, size_t place, uint32_t row)
+static void *row_of(const struct build *b, size_t place, uint32_t row)
 {
-    return w->arena + place + sizeof(float) * row * w->width;
+    return b->w->arena + place + sizeof(float) * row * b->parts.width;
 }
 
 static void set_corner(float *to, uint32_t width, vec3 p)
@@ -89,9 +89,9 @@ static void fill_leaf(const struct build *b, const struct empty_leaf *leaf)
 {
     const struct scene *s = b->scene;
     const struct wide_item *item = b->item + leaf->first;
-    const uint32_t width = b->w->width, count = leaf->count;
-    float *corner = row_of(b->w, leaf->place, 0);
-    uint32_t *number = row_of(b->w, leaf->place, 9);
+    const uint32_t width = b->parts.width, count = leaf->count;
+    float *corner = row_of(b, leaf->place, 0);
+    uint32_t *number = row_of(b, leaf->place, 9);
     for (uint32_t i = 0; i < 9 * width; i++)
         corner[i] = NAN;
     for (uint32_t i = 0; i < width; i++)
@@ -133,13 +133,13 @@ static uint32_t add_leaf(struct build *b, const struct wide_range *r)
         b->leaf = larger;
         b->leaf_room = room;
     }
-    if (!reserve(b, WIDE_LEAF_SIZE(w->width)))
+    if (!reserve(b, WIDE_LEAF_SIZE(b->parts.width)))
         return WIDE_PLACE;
     uint32_t ref = (uint32_t)w->used | WIDE_LEAF;
     if (is_sphere(b, r->first))
         ref |= WIDE_SPHERES;
     b->leaf[w->num_leaves++] = (struct empty_leaf){(uint32_t)w->used, r->first, r->count};
-    w->used += WIDE_LEAF_SIZE(w->width);
+    w->used += WIDE_LEAF_SIZE(b->parts.width);
     return ref;
 }
 
@@ -156,17 +156,17 @@ static bool add_node(struct build *b, uint32_t i, int depth)
     uint32_t child[WIDE_MOST], ref[WIDE_MOST] = {0};
     int n = wide_build_children(&b->parts, i, child);
     struct wide *w = b->w;
-    if (!reserve(b, WIDE_NODE_SIZE(w->width)))
+    if (!reserve(b, WIDE_NODE_SIZE(b->parts.width)))
         return false;
     size_t place = w->used;
-    w->used += WIDE_NODE_SIZE(w->width);
+    w->used += WIDE_NODE_SIZE(b->parts.width);
     w->num_nodes++;
     if (depth > w->depth)
         w->depth = depth;
     w->cost += chance(b, &part[i].box);
     for (uint32_t a = 0; a < 3; a++) {
-        float *low = row_of(w, place, 2 * a), *high = row_of(w, place, 2 * a + 1);
-        for (int k = 0; k < (int)w->width; k++) {
+        float *low = row_of(b, place, 2 * a), *high = row_of(b, place, 2 * a + 1);
+        for (int k = 0; k < (int)b->parts.width; k++) {
             low[k] = k < n ? part[child[k]].box.v[a] : INFINITY;
             high[k] = k < n ? -part[child[k]].box.v[4 + a] : -INFINITY;
         }
@@ -187,7 +187,7 @@ static bool add_node(struct build *b, uint32_t i, int depth)
             if (!add_node(b, child[k], depth + 1))
                 return false;
         }
-    memcpy(row_of(w, place, 6), ref, sizeof *ref * w->width);
+    memcpy(row_of(b, place, 6), ref, sizeof *ref * b->parts.width);
     return true;
 }
 
@@ -205,7 +205,7 @@ static bool add_list(struct build *b, const uint32_t *prim, uint32_t num)
     if ((w->flat = malloc(sizeof *w->flat)) == NULL)
         return false;
     small_scene_fill(b->scene, prim, (int)num, w->flat);
-    w->num_list_leaves = (num + w->width - 1) / w->width;
+    w->num_list_leaves = (num + b->parts.width - 1) / b->parts.width;
     w->cost = w->num_list_leaves;
     return true;
 }
@@ -282,7 +282,7 @@ struct wide *wide_build(const struct scene *s, enum isa isa, int threads, struct
         goto fail;
     w->kernel = code[isa].kernel;
     assert(w->kernel != NULL);
-    w->width = b.parts.width = w->kernel->width;
+    b.parts.width = w->kernel->width;
     w->list = code[isa].list;
     w->num_triangles = s->num_triangles;
     b.capacity = 64 * (size_t)all.count + 4096;

@@ -19,7 +19,7 @@ enum { WIDE_MOST = 16, WIDE_FLAT = 32, WIDE_LINE = 64 };
 #define WIDE_SPHERES 2u
 #define WIDE_PLACE   0xffffffc0u
 
-/* Nodes and leaves are rows of `width` floats or uint32_t.
+/* Nodes and leaves are rows of kernel->width floats or uint32_t, eight or WIDE_MOST.
  * A node, in whole lines of the cache: six rows of planes (x low, x high, y low, ...) and one of references to the
  * children. An empty child has low = infinity, high = -infinity.
  * A leaf: nine rows of corners (x, y and z of the first ones, of the second, of the third) and one of primitive
@@ -38,7 +38,6 @@ struct wide {
     size_t used;              /* bytes */
     const struct traverse *kernel;
     const struct small_scene_trace *list; /* the list's kernel */
-    uint32_t width;                       /* kernel->width: eight, or WIDE_MOST */
     float min[3], max[3];                 /* of the scene */
     float tree_min[3], tree_max[3];       /* of what is in the tree */
     uint32_t num_list_leaves;             /* leaf tests that the list counts as */

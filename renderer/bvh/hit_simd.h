@@ -16,6 +16,14 @@ static __attribute__((noinline, cold)) void edge_exact(const vf *ax, const vf *a
                 (float)((double)(*ax)[i] * (double)(*by)[i] - (double)(*ay)[i] * (double)(*bx)[i]);
 }
 
+/* Lanes whose three edge functions have one sign, or are 0. NaNs, of which a leaf's empty lanes consist, do not pass:
+ * most leaves have some. */
+INLINE vm edges_agree(vf e0, vf e1, vf e2)
+{
+    const vf zero = vf_set(0);
+    return vf_le(zero, vf_min(vf_min(e0, e1), e2)) | vf_le(vf_max(vf_max(e0, e1), e2), zero);
+}
+
 /* triangle_intersect() without the comparison of t; returns the lanes that pass. x, y, z: the corners
  * in the sheared frame, whose origin is that of the ray; sz: as in struct shear. */
 INLINE vm sheared_hit(const vf x[3], const vf y[3], const vf z[3], vf sz, vf *t, vf *u, vf *v)
@@ -24,8 +32,7 @@ INLINE vm sheared_hit(const vf x[3], const vf y[3], const vf z[3], vf sz, vf *t,
     vf e1 = x[2] * y[0] - y[2] * x[0];
     vf e2 = x[0] * y[1] - y[0] * x[1];
     const vf zero = vf_set(0);
-    /* Such that NaNs, of which a leaf's empty lanes consist, do not pass: most leaves have some. */
-    vm pass = vf_le(zero, vf_min(vf_min(e0, e1), e2)) | vf_le(vf_max(vf_max(e0, e1), e2), zero);
+    vm pass = edges_agree(e0, e1, e2);
     if (!bits(pass))
         return pass;
     if (__builtin_expect(bits(pass & (vf_eq(e0, zero) | vf_eq(e1, zero) | vf_eq(e2, zero))) != 0,
@@ -33,7 +40,7 @@ INLINE vm sheared_hit(const vf x[3], const vf y[3], const vf z[3], vf sz, vf *t,
         edge_exact(&x[1], &y[1], &x[2], &y[2], &e0);
         edge_exact(&x[2], &y[2], &x[0], &y[0], &e1);
         edge_exact(&x[0], &y[0], &x[1], &y[1], &e2);
-        pass = vf_le(zero, vf_min(vf_min(e0, e1), e2)) | vf_le(vf_max(vf_max(e0, e1), e2), zero);
+        pass = edges_agree(e0, e1, e2);
     }
     /* Without area the inverse is infinite and t is NaN, which fails every comparison. */
     vf inv = 1 / (e0 + e1 + e2);

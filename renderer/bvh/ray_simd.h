@@ -92,13 +92,17 @@ INLINE void rayv_store_flags(const struct rayv *q, const uint16_t lane[LANES], v
             flag[lane[i]] = flags[i];
 }
 
+/* The largest float below a. */
+INLINE vf below(vf a)
+{
+    vi b = (vi)a, one = vi_select(vi_lt(vi_set(-1), b), vi_set(-1), vi_set(1));
+    return (vf)vi_select(vf_eq(a, vf_set(0)), vi_set(INT32_MIN + 1), b + one);
+}
+
 INLINE void rayv_init(const struct rays *r, const uint16_t lane[LANES], struct rayv *q)
 {
     rayv_load(r, lane, q);
-    vi tmax = (vi)q->tmax;
-    vm zero = vf_eq((vf)tmax, vf_set(0));
-    q->limit = (vf)vi_select(zero, vi_set(INT32_MIN + 1),
-                             tmax + vi_select(vi_lt(vi_set(-1), tmax), vi_set(-1), vi_set(1)));
+    q->limit = below(q->tmax);
     rayv_shear(q);
     q->u = q->v = vf_set(0);
     q->prim = vi_set(NOTHING);

@@ -47,21 +47,14 @@ INLINE vm list_triangle(const struct small_scene *f, const struct list *l, int i
                         const struct rayv *q, vf limit, vf *t, vf *u, vf *v)
 {
     const uint8_t *c = f->triangle[i].corner, *e = f->triangle[i].edge;
-    const vf *edge = l->edge[0], zero = vf_set(0);
+    const vf *edge = l->edge[0];
     vf e0 = edge[e[0]], e1 = edge[e[1]], e2 = edge[e[2]];
-    vm pass = ~(vf_lt(vf_min(vf_min(e0, e1), e2), zero) & vf_lt(zero, vf_max(vf_max(e0, e1), e2)));
+    vm pass = edges_agree(e0, e1, e2);
     vf inv = 1 / (e0 + e1 + e2);
     *u = e1 * inv;
     *v = e2 * inv;
     *t = q->sz * (e0 * inv * l->z[c[0]] + *u * l->z[c[1]] + *v * l->z[c[2]]);
     return pass & vf_lt(q->tmin, *t) & vf_lt(*t, limit);
-}
-
-/* The largest float below a. */
-INLINE vf below(vf a)
-{
-    vi b = (vi)a, one = vi_select(vi_lt(vi_set(-1), b), vi_set(-1), vi_set(1));
-    return (vf)vi_select(vf_eq(a, vf_set(0)), vi_set(INT32_MIN + 1), b + one);
 }
 
 INLINE vm list_sphere(const struct small_scene *f, int i, const struct rayv *q, vf limit, vf *t)

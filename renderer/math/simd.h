@@ -51,11 +51,11 @@ typedef float vf __attribute__((vector_size(4 * LANES)));
 typedef int32_t vi __attribute__((vector_size(4 * LANES)));
 typedef uint32_t vu __attribute__((vector_size(4 * LANES)));
 
+/* With sanitizers wider than a lane, so that arithmetic on masks and numbers, which C allows, does not compile. */
 #if LANES < 16
 typedef vi vm;
 #elif defined __SANITIZE_ADDRESS__
-typedef uint64_t
-    vm; /* wider than a lane, so that arithmetic on a mask and numbers does not compile */
+typedef uint64_t vm;
 #else
 typedef uint16_t vm;
 #endif

@@ -23,7 +23,7 @@ enum {
 struct light_row {
     rgb radiance;
     float pdf_a;
-    int32_t both_sides;        /* a lane mask: -1 or 0 */
+    int32_t both_sides;        /* -1 or 0 */
     int32_t first, untextured; /* first record; number of records, 0 if textured or a sphere */
     float area;                /* LAMP_AREA of its last record */
 };
