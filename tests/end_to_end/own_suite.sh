@@ -17,11 +17,13 @@ mkdir "$tmp/walk" "$tmp/free" "$tmp/once" "$tmp/rendered"
 # files.
 cat >"$tmp/once/once" <<END
 #!/bin/bash
-out=\$1
+out=\$1 words=(\$2) files=()
 shift
-key=$tmp/rendered/\$(for word in "\${@:2}"; do
-    [ "\$word" = "\$out" ] || cat "\$word" 2>/dev/null || echo "\$word"
-done | cat - <(echo "\$1") | md5sum | cut -c 1-32)
+for word in "\${@:2}"; do
+    if [ "\$word" = "\$out" ]; then continue; elif [ -f "\$word" ]; then files+=("\$word"); else words+=("\$word"); fi
+done
+key=\$(cat "\${files[@]}" - <<<"\${words[*]}" | md5sum)
+key=$tmp/rendered/\${key%% *}
 if [ ! -f "\$key" ]; then
     "\$@" || exit
     cp "\$out" "\$key.\$\$" && mv "\$key.\$\$" "\$key"
