@@ -49,13 +49,17 @@ static atomic_bool armed;
 static atomic_long count; /* of the calls while armed */
 static _Thread_local bool spared;
 static long fail_at; /* 0: none fails, and `seen` is written */
-/* Shared by all runs. */
+/* Shared by all runs. Large arrays are here, where LeakSanitizer looks for no pointers: it would touch each of their
+ * pages in each run. */
 static struct shared {
     long count;
     int num_frames;
     char module[4096];              /* library that the first run loaded late; "": none */
     uintptr_t frame[MAX_FRAMES];    /* of the call that failed */
     uint64_t seen[MAX_ALLOCATIONS]; /* hash of the calls that led to each allocation */
+    uint64_t done[MAX_CHOSEN];      /* hashes that earlier commands have tried */
+    long chosen[MAX_CHOSEN];
+    char text[1 << 18]; /* of a file that a run left */
 } * shared;
 
 /* Not backtrace(), which allocates. */
@@ -385,9 +389,8 @@ static bool may_be_left(const char *path)
  * judged? */
 static bool is_whole_and_says_it(const char *path)
 {
-    static char text[1 << 18];
-    const long n = read_file(path, text, sizeof text);
-    return n > 0 && says_it(text) && strchr("\n>", text[n - 1]) != NULL;
+    const long n = read_file(path, shared->text, sizeof shared->text);
+    return n > 0 && says_it(shared->text) && strchr("\n>", shared->text[n - 1]) != NULL;
 }
 
 static int check_entry(const char *path, const struct stat *s, int type, struct FTW *at)
@@ -498,14 +501,14 @@ static void check_run(int status, int right_status)
         blame("did not fail, and said something else", out);
 }
 
-static bool is_chosen(long i, long num, const uint64_t *done, size_t num_done)
+static bool is_chosen(long i, long num, size_t num_done)
 {
     bool first = true, last = true;
     const uint64_t hash = shared->seen[i];
     if (hash == 0 || getenv("NO_MEMORY_ALL") != NULL)
         return hash != 0;
     for (size_t k = 0; k < num_done; k++)
-        if (done[k] == hash)
+        if (shared->done[k] == hash)
             return false;
     for (long k = 0; k < i && first; k++)
         first = shared->seen[k] != hash;
@@ -556,15 +559,14 @@ int __wrap_main(int argc, char **argv, char **env)
         printf("not ok no memory: %s: fails anyway: %s\n", name, said);
         return 1;
     }
-    static uint64_t done[MAX_CHOSEN];
     FILE *f = fopen(getenv("NO_MEMORY_DONE"), "a+b");
     if (f == NULL)
         abort();
-    const size_t num_done = fread(done, sizeof *done, sizeof done / sizeof *done, f);
-    static long chosen[MAX_CHOSEN];
+    const size_t num_done = fread(shared->done, sizeof *shared->done, MAX_CHOSEN, f);
+    long *chosen = shared->chosen;
     long num_chosen = 0, survived = 0, tried = 0, wrong = 0, of[2] = {0}, step[2] = {1, 1};
     for (long i = 0; i < num && num_chosen < MAX_CHOSEN; i++)
-        if (is_chosen(i, num, done, num_done)) {
+        if (is_chosen(i, num, num_done)) {
             chosen[num_chosen++] = i;
             of[shared->seen[i] % 2]++;
         }
@@ -575,7 +577,7 @@ int __wrap_main(int argc, char **argv, char **env)
         const int ours = shared->seen[chosen[i]] % 2;
         if (--of[ours] % step[ours] != 0)
             continue;
-        fwrite(&shared->seen[chosen[i]], sizeof *done, 1, f);
+        fwrite(&shared->seen[chosen[i]], sizeof *shared->seen, 1, f);
         check_run(run_command(chosen[i] + 1, argc, argv, env), right);
         tried++;
         survived += !failed;
