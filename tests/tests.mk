@@ -40,7 +40,7 @@ SANITIZE := -O1 -g1 -fno-omit-frame-pointer -fno-sanitize-recover=all -fsanitize
 # private: otherwise objects that a build takes from another would get its flags.
 # Builds: san with ASan and UBSan; clang for its warnings and for the fuzzers; on demand tsan with ThreadSanitizer and
 # cov with clang's coverage counters.
-$(BUILD)/san/%: private OPT := $(SANITIZE) -no-pie
+$(BUILD)/san/%: private OPT := $(SANITIZE)
 # Files in which tests spend most of their time are worth more optimisation.
 BUSY := renderer/bvh/bvh tools/compare/hint tools/diagnose/bug_fit tools/diagnose/signature tools/exact/permutation tools/grade/difference tools/images/flip
 $(BUSY:%=$(BUILD)/san/%.c.o): OPT = $(SANITIZE:-O1=-O2)

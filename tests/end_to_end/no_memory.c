@@ -17,6 +17,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <ftw.h>
+#include <limits.h>
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdbool.h>
@@ -290,6 +291,10 @@ static int faulty_main(const char *fault)
     first = second = kept = NULL;
     if (ok || strcmp(fault, "wrong") == 0)
         return !write_file(ok ? "whole" : "who");
+    if (strcmp(fault, "undefined") == 0) {
+        volatile int most = INT_MAX;
+        most++;
+    }
     if (!half)
         unlink("file");
     if (strcmp(fault, "silent") != 0)

@@ -38,8 +38,8 @@ no_memory() {
 prepare() { "$@" >"$tmp/out" 2>&1 || { echo "not ok no memory: cannot prepare: $*: $(head -c 300 "$tmp/out")" && failures=$((failures + 1)); }; }
 render() { prepare "$plain" -q -t 1 -r 16 16 "$@"; }
 
-for fault in none unchecked leak silent misleading 'two lines' points wrong half; do
-    [ "$fault" = leak ] && ! nm -D "$assay" | grep -q __asan && continue
+for fault in none unchecked undefined leak silent misleading 'two lines' points wrong half; do
+    [[ $fault == @(leak|undefined) ]] && ! nm -D "$assay" | grep -q __asan && continue
     mkdir "$tmp/case"
     seen=$(NO_MEMORY=$tmp/case NO_MEMORY_DONE=/dev/null NO_MEMORY_FAULT=$fault NO_MEMORY_NAME=fault "$assay" 2>/dev/null | grep -c '^not ok')
     rm -rf "$tmp/case"

@@ -12,6 +12,6 @@ const char *__asan_default_options(void);
  * freed is used again after 16 MB, not 256. */
 const char *__asan_default_options(void)
 {
-    return "intercept_tls_get_addr=0:handle_sigill=1:clear_shadow_mmap_threshold=100000000:"
+    return "intercept_tls_get_addr=0:handle_sigill=1:clear_shadow_mmap_threshold=500000:"
            "quarantine_size_mb=16";
 }
