@@ -286,6 +286,33 @@ TEST(one_image_for_all_is_not_carried_on)
     }
 }
 
+/* The deviations that a diagnosis prefers can leave all points, though it names a bug: no part has paid for it. */
+TEST(nothing_is_carried_on_where_no_points_are_lost)
+{
+    static struct result result[RUBRIC_CHECKS];
+    bool paid[RUBRIC_PARTS] = {false};
+    struct submitted_images *h = bug_images_hand_in(&of, 0, -1, -1, 1);
+    const struct grading g = {of.rubric, of.answers, h, 1e-5, &of.bugs};
+    const struct diagnosis found = {.finding = FINDING_BUG,
+                                    .candidate = {{.bug = bug_images_number(&of, "cosine_missing"),
+                                                   .second = -1,
+                                                   .amplitude = 1}},
+                                    .num_candidates = 1,
+                                    .num_named = 1};
+    struct err e;
+    int set;
+    MUST(grade_all_checks(&g, result, &set, &e));
+    MUST(carried_by_name(&g, set, &found, result, paid, &e));
+    for (int i = 0; i < of.rubric->num_checks; i++) {
+        assert_true(result[i].share == 1);
+        assert_string_equal(result[i].carried, "");
+        result_free(&result[i]);
+    }
+    for (int i = 0; i < RUBRIC_PARTS; i++)
+        assert_false(paid[i]);
+    bug_images_take_back(&of, h);
+}
+
 /* Where a bug stands is told by the words of the patch and of the rubric. */
 TEST(bugs_have_their_parts)
 {
