@@ -656,6 +656,13 @@ expect "golden approve --all: none needed" 0 "0 approved, 0 unchanged" \
     $golden approve --all --from "$tmp/none" --golden "$tmp/store" 11_furnace/cycles
 expect "golden approve: not in the suite" 3 "no such reference" \
     $golden approve --from golden --golden "$tmp/store" 98_deleted/cycles
+# Two images and four records of noise share the alpha of the run, 1e-3.
+mkdir "$tmp/again" && cp -R "$tmp/store/11_furnace" "$tmp/again"
+sed -i 's/"made": *"2/"made":"3/g' "$tmp/again/11_furnace/noise.json"
+expect "golden approve: noise that was measured again" 0 "4 approved, 2 unchanged" \
+    $golden approve --from "$tmp/again" --golden "$tmp/store" 11_furnace
+tell "each of six candidates has a sixth of alpha" "$(grep -o '"alpha": *[0-9.e-]*' "$tmp/store/11_furnace/noise.json" | sed 's/.*://' |
+    awk '6 * $1 > 0.000999 && 6 * $1 < 0.001001 { n++ } END { if (n != 4 || NR != 4) print n + 0, "of", NR }')"
 cp -R golden/41_cornell "$tmp/store/98_deleted"
 expect "golden status: an orphan" 3 "orphan   .*98_deleted/cycles" $golden status --golden "$tmp/store"
 expect "golden: unknown" 3 "none of render" $golden forget
