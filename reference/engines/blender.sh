@@ -8,5 +8,8 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 cd "$work"
 echo "[$3]" >seeds.json
-blender -b --factory-startup -noaudio --python-exit-code 3 -P "$script" -- --scene "$scene" --spp "$2" --threads "$4" --seeds seeds.json
+# Otherwise a distribution's Blender looks for numpy in the virtual environment that is active.
+case $(realpath "$(command -v blender)") in /usr/bin/*) python="--env-system-python /usr" ;; *) python= ;; esac
+# shellcheck disable=SC2086
+blender $python -b --factory-startup -noaudio --python-exit-code 3 -P "$script" -- --scene "$scene" --spp "$2" --threads "$4" --seeds seeds.json
 mv replicate_0000.exr "$5"
