@@ -54,7 +54,7 @@ fuzz_one() {
         echo "ok fuzz $name: $executions executions, $(ls "$corpus" | wc -l) inputs kept," \
             "$(sed -n 's/^Done [0-9]* runs in \([0-9]*\) second.*/\1/p' "$dir/$name.log") s"
     else
-        echo "not ok fuzz $name: $(grep -m1 -E '^(fuzz: |==[0-9]+== ?ERROR|.*runtime error)' "$dir/$name.log"), see $dir/$name.log"
+        echo "not ok fuzz $name: $(grep -m1 -E '^(fuzz: |==[0-9]+== ?ERROR)' "$dir/$name.log"), see $dir/$name.log"
         return 1
     fi
 }
