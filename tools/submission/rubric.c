@@ -110,15 +110,13 @@ static void read_limit(struct statement *s)
     static const char *const kinds[] = {"wall",         "cpu",  "build",     "memory",
                                         "build-memory", "disk", "processes", NULL};
     struct sandbox_limits *l = &s->r->limit;
-    char *what = take_word(s), word[32];
+    char word[32];
     double mib = 1;
-    int k = 0;
-    while (kinds[k] != NULL && strcmp(what, kinds[k]) != 0)
-        k++;
-    if (kinds[k] == NULL) {
-        rubric_mistake(
-            s->m, s->line,
-            "'limit %s' is none of wall, cpu, build, memory, build-memory, disk, processes", what);
+    struct err why;
+    int k;
+    if (!cli_choice("limit", take_word(s), kinds, &k, &why)) {
+        rubric_mistake(s->m, s->line, "%s", why.msg);
+        s->rest += strlen(s->rest); /* the value of an unknown limit is no second mistake */
         return;
     }
     snprintf(word, sizeof word, "limit %s", kinds[k]);

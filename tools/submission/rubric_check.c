@@ -1,5 +1,6 @@
 /* Checks a rubric as a whole: what its images, scenes and checks need of each other. */
 #include "rubric_internal.h"
+#include "renderer/base/cli.h"
 #include "renderer/base/fs.h"
 
 #include "tools/base/text.h"
@@ -262,11 +263,9 @@ static void check_check(const struct rubric *r, struct rubric_check *c, struct r
                            first->name, p->name);
     }
     set_default(c->visibility, sizeof c->visibility, "visible");
-    if (!is_word(c->visibility, visibilities))
-        rubric_mistake(
-            m, c->line,
-            "check '%s': visibility '%s' is none of hidden, after_due_date, after_published, visible",
-            c->name, c->visibility);
+    struct err why;
+    if (!cli_choice("visibility", c->visibility, visibilities, &(int){0}, &why))
+        rubric_mistake(m, c->line, "check '%s': %s", c->name, why.msg);
     set_default(c->title, sizeof c->title, c->name);
     check_carried(r, c, m);
 }

@@ -183,7 +183,7 @@ TEST(each_mistake_is_named_with_its_line)
         {1, 3, "rubric a\ntotal 10\ntotal 20", "a second 'total'"},
         {1, 2, "rubric a\ndiagnose ./x {scene} {out}",
          "'diagnose' is no statement here: 'bugs DIR'"},
-        {1, 2, "rubric a\nlimit patience 5", "limit patience"},
+        {1, 2, "rubric a\nlimit patience 5", "limit: 'patience' is none of: wall"},
         {1, 2, "rubric a\nbudget wall 5", "of cpu"},
         {1, 2, "rubric a\nlimit wall long", "limit wall"},
         {1, 4, "rubric a\nlimit wall 5\nlimit cpu 5\nlimit wall 6", "a second 'limit wall'"},
