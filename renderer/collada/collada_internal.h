@@ -17,7 +17,7 @@
 #include <libxml/tree.h>
 #include <stdio.h>
 
-#define PI     3.14159265358979323846
+#define PI     M_PI
 #define DEGREE (PI / 180)
 
 /* Limits that only a broken or hostile file reaches. */

@@ -8,9 +8,9 @@
  * diameter is the largest chroma, so the speed is constant. The constants keep it inside sRGB. */
 void heatmap_colour(double t, uint8_t rgb8[3])
 {
-    const double pi = 3.14159265358979323846, chroma = 0.2, hue = 288 * pi / 180;
-    double lightness = 0.2 + 0.77 * t, c = chroma * sin(pi * t);
-    double a = c * cos(hue + pi * t), b = c * sin(hue + pi * t);
+    const double chroma = 0.2, hue = 288 * M_PI / 180;
+    double lightness = 0.2 + 0.77 * t, c = chroma * sin(M_PI * t);
+    double a = c * cos(hue + M_PI * t), b = c * sin(hue + M_PI * t);
     /* Oklab to linear sRGB [Ottosson20]. */
     double l = pow(lightness + 0.3963377774 * a + 0.2158037573 * b, 3);
     double m = pow(lightness - 0.1055613458 * a - 0.0638541728 * b, 3);

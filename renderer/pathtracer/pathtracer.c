@@ -84,7 +84,7 @@ static bool setup_camera(const struct options *o, const struct scene *scene, str
 
 static bool print_cameras(const struct options *o, struct err *e)
 {
-    const double degree = 3.14159265358979323846 / 180;
+    const double degree = M_PI / 180;
     struct scene scene = {0};
     if (!collada_load(o->scene, (enum dialect)o->dialect, &scene, e))
         return false;

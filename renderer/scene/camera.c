@@ -122,7 +122,7 @@ bool camera_read_file(struct camera *c, const char *path, struct err *e)
     if (fabsf(dot(axes[0], axes[1])) > 1e-3f ||
         length(sub(cross(axes[0], axes[1]), axes[2])) > 2e-3f)
         return err_set(e, "%s: the camera's matrix is not a rotation", path);
-    const double degree = 3.14159265358979323846 / 180;
+    const double degree = M_PI / 180;
     c->is_orthographic = false;
     c->right = normalize(axes[0]);
     c->up = normalize(axes[1]);

@@ -7,7 +7,7 @@
 #include <string.h>
 #include <strings.h>
 
-static const double PI = 3.14159265358979323846;
+static const double PI = M_PI;
 
 static struct environment *new_environment(enum environment_kind kind, struct err *e)
 {

@@ -255,7 +255,6 @@ static double triangle_area(const vec3 *p)
 /* Appends the lights of all emissive objects to s->lights, which has room for them. */
 static bool append_area_lights(struct scene *s, const char *where, struct err *e)
 {
-    const double pi = 3.14159265358979323846;
     for (uint32_t i = 0; i < s->num_objects; i++) {
         const struct object *o = &s->objects[i];
         if (rgb_is_zero(s->materials[o->material].radiance))
@@ -277,7 +276,7 @@ static bool append_area_lights(struct scene *s, const char *where, struct err *e
                                .textured = s->materials[o->material].radiance_map != 0};
         }
         for (uint32_t k = o->first_sphere; k < o->first_sphere + o->num_spheres; k++) {
-            double r = s->spheres[k].radius, sphere_area = 4 * pi * r * r;
+            double r = s->spheres[k].radius, sphere_area = 4 * M_PI * r * r;
             if (!(sphere_area <= FLT_MAX))
                 return err_set(e, "%s: object '%s': emits, but its area is %g", where, o->name,
                                sphere_area);

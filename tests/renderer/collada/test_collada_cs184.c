@@ -5,7 +5,7 @@
 #include "tests/support/own.h"
 #include "tests/support/test.h"
 
-static const double DEGREE = 3.14159265358979323846 / 180;
+static const double DEGREE = M_PI / 180;
 
 /* Skips the test, loudly, if the file is not there. */
 static struct scene must_load(const char *name, enum dialect dialect)

@@ -18,8 +18,6 @@
 #include <gsl/gsl_randist.h>
 #include <sys/resource.h>
 
-static const double pi = 3.14159265358979323846;
-
 /* Coloured waves around 0.6 (times contrast), a bright disc of up to 1.2, nothing symmetric: averaged over
  * the pixel whose upper left corner is at x, y of an image of side x side pixels. */
 static double scene(double x, double y, int side, int channel, double contrast)
@@ -303,7 +301,7 @@ TEST(test_amounts)
 {
     struct err e;
     enum { SIDE = 16, N = 64, CLAIMS = 400 };
-    const double k = 2 * pi / SIDE, s = 0.5;
+    const double k = 2 * M_PI / SIDE, s = 0.5;
     const double expected[3] = {s, 3, 3};
     static const char *const name[3] = {"shift by x", "scale", "offset"};
     static double truth[3 * SIDE * SIDE], moved[3 * SIDE * SIDE];
@@ -349,7 +347,7 @@ TEST(test_amounts)
 TEST(test_directed_power)
 {
     enum { SIDE = 16, N = 64, CLAIMS = 400 };
-    const double k = 2 * pi / SIDE, s = 0.1;
+    const double k = 2 * M_PI / SIDE, s = 0.1;
     static double truth[3 * SIDE * SIDE], moved[3 * SIDE * SIDE];
     OWN(moments) a = new_moments(SIDE, SIDE, "sample"), b = new_moments(SIDE, SIDE, "sample");
     uint64_t seed = 91;
