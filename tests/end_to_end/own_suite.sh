@@ -9,9 +9,9 @@ trap 'rm -rf "$tmp"' EXIT
 failures=0 what="own suite"
 . tests/end_to_end/expect.sh
 
-make -s install BUILD="$build" PREFIX="$tmp/usr" >"$tmp/install.log" 2>&1
-tell "it installs" "$([ -x "$tmp/usr/bin/assay" ] || tail -n 3 "$tmp/install.log")"
-export PATH=$tmp/once:$tmp/usr/bin:/usr/bin:$PATH
+make -s install BUILD="$build" PREFIX="$tmp/my usr" >"$tmp/install.log" 2>&1
+tell "it installs" "$([ -x "$tmp/my usr/bin/assay" ] || tail -n 3 "$tmp/install.log")"
+export PATH="$tmp/once:$tmp/my usr/bin:/usr/bin:$PATH"
 mkdir "$tmp/walk" "$tmp/free" "$tmp/once" "$tmp/rendered"
 # once OUT PROGRAM ARGUMENT...: renders OUT, or copies it if the same command was run before on the same contents of
 # files.
@@ -38,6 +38,8 @@ cd "$tmp/free" || exit 1
 # `assay init` makes a folder that works from any directory.
 expect "init" 0 "\`assay validate --suite .*/free/begun\` is green" assay init "$tmp/free/begun"
 sed -i 's/^exec pathtracer/exec once "$7" pathtracer/' begun/mine.sh # the same images are wanted again and again from here on
+expect "init in a folder whose name a shell would split" 0 "\`assay validate --suite 'it'.''s mine'\` is green" assay init "it's mine"
+tell "so does the workflow there quote it" "$(grep -q "validate --suite 'it'.''s mine' --out" "it's mine/renders.yml" || grep suite "it's mine/renders.yml")"
 expect "init does not write over what is there" 3 "begun/suite.json is there already" assay init begun
 expect "it is green from another folder" 0 "result: all as it should be, 1 the same" assay validate --suite begun --out report
 tell "validate says where it looked" "$(grep -qx "suite $tmp/free/begun (1 scene), goldens $tmp/free/begun/golden, engine $tmp/free/begun/mine.json" "$tmp/err" || cat "$tmp/err")"
@@ -177,7 +179,7 @@ if ! python3 -c 'import pytest' 2>/dev/null; then
     echo "skip own suite: the guide in Python alone (no python3-pytest)"
     exit $((failures > 0))
 fi
-export PYTHONPATH=$top/tools/python ASSAY_LIBRARY=$tmp/usr/lib/libassay.so.1 PYTHONDONTWRITEBYTECODE=1
+export PYTHONPATH=$top/tools/python ASSAY_LIBRARY="$tmp/my usr/lib/libassay.so.1" PYTHONDONTWRITEBYTECODE=1
 bash ./second.sh >second.out 2>&1 </dev/null
 tell "the guide in Python alone: green, red, green" "$(grep -oE '^[0-9]+ (passed|failed)' second.out | diff - <(printf '2 passed\n2 failed\n2 passed\n') || tail -n 5 second.out)"
 tell "pytest says the verdict, the place and the page" "$(grep -q 'AssertionError: DIFFERENT: ' second.out && grep -q 'worst: ' second.out && grep -q 'page: assay-reports/' second.out ||

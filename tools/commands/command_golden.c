@@ -2,6 +2,7 @@
 #include "reference/suite/suite_own.h"
 #include "renderer/base/cli.h"
 #include "renderer/base/fs.h"
+#include "renderer/base/shell_quote.h"
 #include "tools/base/data_dirs.h"
 #include "tools/golden/approve.h"
 #include "tools/golden/noise_record.h"
@@ -9,6 +10,7 @@
 #include "tools/results/results.h"
 #include "commands.h"
 
+#include <stdlib.h>
 #include <string.h>
 
 enum { MAX_NAMES = 256 };
@@ -161,9 +163,14 @@ static int status(const struct settings *s, const struct suite *suite, struct er
 static void print_command(const struct settings *s, const struct suite_scene *scene,
                           const struct suite_reference *ref)
 {
-    printf(
-        "  assay golden approve --suite %s --from %s --golden %s --accept-difference \"...\" %s/%s\n",
-        s->suite_dir, s->opt.from_dir, s->opt.golden_dir, scene->name, ref->engine);
+    char *command = shell_quote_join(
+        "assay",
+        (const char *[]){"golden", "approve", "--suite", s->suite_dir, "--from", s->opt.from_dir,
+                         "--golden", s->opt.golden_dir, "--accept-difference", "why it may",
+                         fs_path("%s/%s", scene->name, ref->engine).s, NULL});
+    if (command != NULL)
+        printf("  %s\n", command);
+    free(command);
 }
 
 /* Decides on all selected references, even if some are refused; the line for exit code 3 is that of the first

@@ -1,12 +1,14 @@
 /* assay init: starts a suite of the user's own. */
 #include "renderer/base/cli.h"
 #include "renderer/base/fs.h"
+#include "renderer/base/shell_quote.h"
 #include "tools/base/data_dirs.h"
 #include "tools/golden/starter.h"
 #include "tools/results/results.h"
 #include "commands.h"
 
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 struct settings {
@@ -46,9 +48,13 @@ int command_init(int argc, char **argv, struct err *e)
     code = code == 0 ? command_golden(8, approve, e) : code;
     if (code == 0 && !fs_remove_tree(fs_path("%s/build", s.dir[0]).s, e))
         code = EXIT_NOT_JUDGED;
-    if (code == 0)
-        printf("\n%s: `assay validate%s%s` is green; README.md there says what to do next\n",
-               s.dir[0], strcmp(s.dir[0], ".") != 0 ? " --suite " : "",
-               strcmp(s.dir[0], ".") != 0 ? s.dir[0] : "");
+    if (code != 0)
+        return code;
+    const char *suite_option = strcmp(s.dir[0], ".") != 0 ? "--suite" : NULL;
+    char *command =
+        shell_quote_join("assay", (const char *[]){"validate", suite_option, s.dir[0], NULL});
+    if (command != NULL)
+        printf("\n%s: `%s` is green; README.md there says what to do next\n", s.dir[0], command);
+    free(command);
     return code;
 }

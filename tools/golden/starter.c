@@ -78,12 +78,13 @@ bool starter_write(const char *dir, const char *share_dir, struct err *e)
         return false;
     if (realpath(dir, full) == NULL || realpath(fs_beside_program("pathtracer").s, program) == NULL)
         return err_set(e, "%s or pathtracer beside this program: %s", dir, strerror(errno));
-    const char *const words[] = {dirname(program), NULL};
-    char *bin = shell_quote_join(NULL, words);
-    bool ok = bin != NULL || err_set(e, "out of memory");
+    char *name = shell_quote_join(NULL, (const char *[]){fs_base(full), NULL});
+    char *bin = shell_quote_join(NULL, (const char *[]){dirname(program), NULL});
+    bool ok = (name != NULL && bin != NULL) || err_set(e, "out of memory");
     for (size_t i = 0; ok && i < num; i++)
         ok = copy(fs_path("%s/%s", share_dir, files[i].from).s,
-                  fs_path("%s/%s", dir, files[i].to).s, files[i].mode, fs_base(full), bin, e);
+                  fs_path("%s/%s", dir, files[i].to).s, files[i].mode, name, bin, e);
+    free(name);
     free(bin);
     return ok;
 }

@@ -5,8 +5,8 @@
 #include "renderer/base/err.h"
 
 /* Copies share_dir/starter and one of our scenes into dir, which is made. In the files @NAME@ becomes the last part
- * of dir's path, @BIN@ the directory of this program, quoted for a shell. Fails before it writes anything if one of
- * the files exists. */
+ * of dir's path, @BIN@ the directory of this program, both quoted for a shell. Fails before it writes anything if one
+ * of the files exists. */
 NODISCARD bool starter_write(const char *dir, const char *share_dir, struct err *e);
 
 #endif

@@ -28,23 +28,24 @@ deb: all library $(BUILD)/deps-deb
 $(BUILD)/deps-deb: | $(BUILD)/deps
 	$(call install_missing,$(DEPS_DEB))
 
-share := $(DESTDIR)$(PREFIX)/share/assay
+at    := "$(DESTDIR)$(PREFIX)"
+share := $(at)/share/assay
 #: make install    into PREFIX=/usr/local (DESTDIR=: below it)
 install: all library
-	install -d $(DESTDIR)$(PREFIX)/bin $(share)/cycles $(share)/import_check $(DESTDIR)$(PREFIX)/share/man/man1
-	install -m 644 renderer/pathtracer/pathtracer.1 $(DESTDIR)$(PREFIX)/share/man/man1
+	install -d $(at)/bin $(share)/cycles $(share)/import_check $(at)/share/man/man1
+	install -m 644 renderer/pathtracer/pathtracer.1 $(at)/share/man/man1
 	tools/packaging/manual.sh $(BUILD) $(BUILD)/manual
-	install -m 644 $(BUILD)/manual/man1/* $(DESTDIR)$(PREFIX)/share/man/man1
-	install -d $(DESTDIR)$(PREFIX)/share/bash-completion/completions $(DESTDIR)$(PREFIX)/share/zsh/site-functions
-	install -m 644 $(BUILD)/manual/bash-completion/* $(DESTDIR)$(PREFIX)/share/bash-completion/completions
-	install -m 644 $(BUILD)/manual/zsh/* $(DESTDIR)$(PREFIX)/share/zsh/site-functions
-	install -m 755 $(BUILD)/pathtracer $(BUILD)/assay $(DESTDIR)$(PREFIX)/bin
-	install -D -m 755 $(BUILD)/oiio.so $(DESTDIR)$(PREFIX)/lib/assay/oiio.so
-	install -D -m 644 tools/library/assay.h $(DESTDIR)$(PREFIX)/include/assay.h
-	install -m 755 $(BUILD)/libassay.so.$(LIBRARY_ABI) $(DESTDIR)$(PREFIX)/lib
-	ln -sf libassay.so.$(LIBRARY_ABI) $(DESTDIR)$(PREFIX)/lib/libassay.so
-	install -d $(DESTDIR)$(PREFIX)/lib/pkgconfig
-	sed 's,@PREFIX@,$(PREFIX),; s,@VERSION@,$(VERSION),' tools/library/assay.pc.in >$(DESTDIR)$(PREFIX)/lib/pkgconfig/assay.pc
+	install -m 644 $(BUILD)/manual/man1/* $(at)/share/man/man1
+	install -d $(at)/share/bash-completion/completions $(at)/share/zsh/site-functions
+	install -m 644 $(BUILD)/manual/bash-completion/* $(at)/share/bash-completion/completions
+	install -m 644 $(BUILD)/manual/zsh/* $(at)/share/zsh/site-functions
+	install -m 755 $(BUILD)/pathtracer $(BUILD)/assay $(at)/bin
+	install -D -m 755 $(BUILD)/oiio.so $(at)/lib/assay/oiio.so
+	install -D -m 644 tools/library/assay.h $(at)/include/assay.h
+	install -m 755 $(BUILD)/libassay.so.$(LIBRARY_ABI) $(at)/lib
+	ln -sf libassay.so.$(LIBRARY_ABI) $(at)/lib/libassay.so
+	install -d $(at)/lib/pkgconfig
+	sed 's,@PREFIX@,$(PREFIX),; s,@VERSION@,$(VERSION),' tools/library/assay.pc.in >$(at)/lib/pkgconfig/assay.pc
 	install -m 644 reference/cycles/*.py $(share)/cycles
 	install -m 644 reference/import_check/*.py $(share)/import_check
 	install -m 644 tools/docs/formats/*.schema.json $(share)
