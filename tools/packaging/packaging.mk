@@ -46,9 +46,11 @@ install: all library
 	ln -sf libassay.so.$(LIBRARY_ABI) $(at)/lib/libassay.so
 	install -d $(at)/lib/pkgconfig
 	sed 's,@PREFIX@,$(PREFIX),; s,@VERSION@,$(VERSION),' tools/library/assay.pc.in >$(at)/lib/pkgconfig/assay.pc
+	chmod 644 $(at)/lib/pkgconfig/assay.pc
 	install -m 644 reference/cycles/*.py $(share)/cycles
 	install -m 644 reference/import_check/*.py $(share)/import_check
 	install -m 644 tools/docs/formats/*.schema.json $(share)
 	cp -R reference/scenes reference/engines reference/starter golden tools/rubrics $(share)
+	chmod -R u=rwX,go=rX $(share)
 
 .PHONY: library autograder deb install
