@@ -11,8 +11,6 @@ rm -rf "$log"
 mkdir -p "$log"
 # Blender's own scripts take half a second to compile at each start, where nothing may be written beside them.
 export PYTHONPYCACHEPREFIX=$(realpath "$log")/python PYTHONDONTWRITEBYTECODE=
-# Memory that a program has freed it uses again: some machines take ten microseconds for a new page.
-export MALLOC_MMAP_THRESHOLD_=1000000000 MALLOC_TRIM_THRESHOLD_=1000000000
 
 # run_job LOG NAME COMMAND...: its output, exit status and CPU seconds into files, so that jobs may run side by side.
 run_job() {
