@@ -168,8 +168,7 @@ static void print_command(const struct settings *s, const struct suite_scene *sc
         (const char *[]){"golden", "approve", "--suite", s->suite_dir, "--from", s->opt.from_dir,
                          "--golden", s->opt.golden_dir, "--accept-difference", "why it may",
                          fs_path("%s/%s", scene->name, ref->engine).s, NULL});
-    if (command != NULL)
-        printf("  %s\n", command);
+    printf("  %s\n", command != NULL ? command : "the same command, with --accept-difference");
     free(command);
 }
 

@@ -53,8 +53,8 @@ int command_init(int argc, char **argv, struct err *e)
     const char *suite_option = strcmp(s.dir[0], ".") != 0 ? "--suite" : NULL;
     char *command =
         shell_quote_join("assay", (const char *[]){"validate", suite_option, s.dir[0], NULL});
-    if (command != NULL)
-        printf("\n%s: `%s` is green; README.md there says what to do next\n", s.dir[0], command);
+    printf("\n%s: `%s` is green; README.md there says what to do next\n", s.dir[0],
+           command != NULL ? command : "assay validate");
     free(command);
     return code;
 }

@@ -3,7 +3,7 @@
 # manual), libassay1, libassay-dev, python3-assay. Needs dpkg-dev; dependencies on libraries are those that
 # dpkg-shlibdeps finds. The maintainer is DEBFULLNAME <DEBEMAIL>, or else the committer of the last commit.
 set -euo pipefail
-build=$(realpath "${1:?usage: tools/packaging/deb.sh BUILD VERSION OUT}") version=${2:?} out=${3:?}
+build=${1:?usage: tools/packaging/deb.sh BUILD VERSION OUT} version=${2:?} out=${3:?}
 mkdir -p "$out"
 out=$(realpath "$out")
 work=$(mktemp -d)
@@ -13,7 +13,7 @@ arch=$(dpkg --print-architecture) lib=usr/lib/$(dpkg-architecture -qDEB_HOST_MUL
 maker="${DEBFULLNAME:-$(git log -1 --format=%cn)} <${DEBEMAIL:-$(git log -1 --format=%ce)}>"
 date=$(date -R -d "@${SOURCE_DATE_EPOCH:-$(git log -1 --format=%ct 2>/dev/null || date +%s)}")
 
-make -s install BUILD="$1" PREFIX=/usr DESTDIR="$work/all"
+make -s install BUILD="$build" PREFIX=/usr DESTDIR="$work/all"
 cd "$work"
 mkdir -p libassay1/$lib libassay1/usr/lib/assay libassay-dev/$lib/pkgconfig libassay-dev/usr/include python3-assay/usr/lib/python3/dist-packages/assay debian
 install -m 644 all/usr/lib/libassay.so.1 libassay1/$lib
