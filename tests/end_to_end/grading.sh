@@ -102,6 +102,8 @@ check "its points" points bob 8.50
 check "of the same runs" test "$(times "$tmp/two")" = "$before"
 check "the appeal withdrawn, beside what was" "$build/assay" grade -q -o "$tmp/three" --before "$tmp/two" "$tmp/other.rubric" "$tmp/submissions"/*
 check "of the same runs" test "$(times "$tmp/three")" = "$before"
+check "grades that are not there" sh -c '"$@" 2>&1; [ $? = 3 ]' sh "$build/assay" grade -q -o "$tmp/four" --before "$tmp/no" "$tmp/other.rubric" "$tmp/submissions"/*
+check "and nothing is graded" test ! -e "$tmp/four"
 check "what changed" grep -q '"was": 3.5' "$tmp/three/bob/grade.json"
 check "graded again" again --again
 check "of other runs (control)" test "$(times "$tmp/two")" != "$before"

@@ -157,6 +157,7 @@ for name in built prebuilt; do points programs $name 4.0; done
 # The compiler cache: filled by staff only, from the starter code.
 if command -v ccache >/dev/null; then
     cache() { find "$tmp/cache" -type f -name '*[RM]' | sort | xargs sha256sum; }
+    expect "a cache that was never filled" 3 "cache: No such file or directory; --fill-build-cache makes it" grade cached --build-cache "$tmp/cache" "$tmp/make.rubric" "$tmp/class/right"
     expect "the cache is filled" 0 "filled by building" "$build/assay" grade --fill-build-cache --build-cache "$tmp/cache" "$tmp/make.rubric" "$tmp/tree"
     cache >"$tmp/before"
     expect "and used" 0 "4.00 of 6" grade cached --build-cache "$tmp/cache" "$tmp/make.rubric" "$tmp/class/right" "$tmp/class/writes"

@@ -4,8 +4,11 @@
 #include "renderer/base/cli_rewrite.h"
 #include "renderer/base/fs.h"
 
+#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
 
 /* The first word is the rubric, the others are submissions. */
 static bool read_word(void *settings, const char *const v[4], struct err *e)
@@ -74,6 +77,8 @@ bool grade_options_parse(int argc, char **argv, struct grade_settings *s, struct
 {
     if (!cli_read(options, argc, argv, s, e) || s->help)
         return s->help;
+    if (s->before != NULL && access(s->before, R_OK | X_OK) != 0)
+        return err_set(e, "--before %s: %s", s->before, strerror(errno));
     s->before = s->before != NULL ? s->before : s->out;
     s->jobs = s->jobs > 0 ? s->jobs : cli_processors();
     if (s->rubric == NULL)
@@ -82,6 +87,9 @@ bool grade_options_parse(int argc, char **argv, struct grade_settings *s, struct
         return err_set(e, "--%s takes no submissions", s->only_check ? "check-rubric" : "prepare");
     if (s->fill && (s->build_cache == NULL || s->num != 1))
         return err_set(e, "--fill-build-cache needs --build-cache DIR and the starter code");
+    if (s->build_cache != NULL && !s->fill && access(s->build_cache, R_OK | X_OK) != 0)
+        return err_set(e, "--build-cache %s: %s; --fill-build-cache makes it from the starter code",
+                       s->build_cache, strerror(errno));
     return s->only_check || s->prepare || s->num > 0 ||
            err_set(e, "no submission given (see --help)");
 }
