@@ -392,11 +392,12 @@ bool carried_by_ratio(const struct grading *g, int set, const double *share, con
                       struct result *result, struct err *e)
 {
     const struct rubric *r = g->r;
-    bool ok = true;
+    bool stops, ok = grade_checks_stops(g, &stops, e);
     for (int i = 0; ok && i < r->num_checks; i++) {
         const struct rubric_check *c = &r->check[i];
         const struct rubric_image *p = &r->image[c->images[0]];
-        if (result[i].share == 1 || paid[c->part] || !result[i].judged || !is_there(g->h, c))
+        if (result[i].share == 1 || paid[c->part] || !result[i].judged || !is_there(g->h, c) ||
+            (rubric_is_adaptive(p) && !stops))
             continue;
         /* All sets are tried: a mistake in every image that shows an accepted deviation hides it
          * (grade_all_checks()). */

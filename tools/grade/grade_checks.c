@@ -157,6 +157,14 @@ static bool check_equal(struct judging *w, struct result *out, struct err *e)
         out->expected, sizeof out->expected,
         "the mean of the image within %.3g %%, of any 8 x 8 pixels within %.3g %% of the reference",
         100 * w->check->image.full, 100 * w->check->tile.full);
+    bool stops = true;
+    if (rubric_is_adaptive(p) && !grade_checks_stops(w->g, &stops, e))
+        return false;
+    if (!stops) {
+        snprintf(out->seen, sizeof out->seen,
+                 "no pixel of any image stopped early: there is no adaptive sampling");
+        return true;
+    }
     if (!judging_find_usable(w, out, e))
         return false;
     double blind = out->more;

@@ -108,6 +108,11 @@ void grade_checks_growth(const struct grading *g, const struct rubric_check *c, 
 NODISCARD bool grade_checks_rates(const struct grading *g, int set, const struct rubric_check *c,
                                   struct result *out, struct err *e);
 
+/* Does any pixel of any image of a check of kind rates stop early? True, too, where no such image is free
+ * of noise: a program whose images are noisier than ours may rightly take all samples. One that never
+ * stops has no adaptive sampling, and no points for what that leaves as it was. Fails only out of memory. */
+NODISCARD bool grade_checks_stops(const struct grading *g, bool *stops, struct err *e);
+
 /* All checks, out[0 .. num_checks-1], graded with the set of accepted deviations that leaves the
  * most points. The empty set wins unless another brings more than 1 % of all points and some check of
  * an image that loses points without it loses none with it, and not because it is noisy: a bug that

@@ -62,14 +62,50 @@ bool grade_checks_judge_rates(struct judging *w, struct result *out, struct err 
     return true;
 }
 
+/* Do all samples of a pixel have the same value, but for rounding? */
+static bool is_noiseless(const struct moments *m)
+{
+    for (size_t i = 0; i < 3 * (size_t)m->width * (size_t)m->height; i++)
+        if (m->m2[i] > 1e-9 * m->n[i / 3] * m->mean[i] * m->mean[i])
+            return false;
+    return m->width > 0;
+}
+
+bool grade_checks_stops(const struct grading *g, bool *stops, struct err *e)
+{
+    bool never = false;
+    for (int i = 0; i < g->r->num_checks; i++) {
+        const struct rubric_check *c = &g->r->check[i];
+        const int image = c->images[0];
+        struct rate_image rates;
+        struct err why; /* of the image: grade_checks_judge_rates() reports it */
+        if (c->kind != CHECK_RATES || g->h->image[image].mean == NULL)
+            continue;
+        if (rate_image_read(g->h->made[image].rates, &g->r->image[image], c->batch,
+                            answer_key_counts(g->a, 0, image), &rates, &why)) {
+            *stops = rates.early > 0;
+            never = never || is_noiseless(&g->a->of[0][image].noise);
+            if (*stops)
+                return true;
+        } else if (err_is_of_memory(&why)) {
+            return err_set(e, "%s", why.msg);
+        }
+    }
+    *stops = !never;
+    return true;
+}
+
 bool grade_checks_rates(const struct grading *g, int set, const struct rubric_check *c,
                         struct result *out, struct err *e)
 {
     int image = c->images[0];
+    const struct judging w = {.g = g, .check = c, .set = set};
     const struct rubric_image *p = &g->r->image[image];
     struct stopping by[NUM_STOPPING_KINDS];
     struct rate_image rates;
     struct err why; /* of the image: grade_checks_judge_rates() has reported it */
+    if (!judging_expect_noise(&w, e))
+        return false;
     if (!rate_image_read(g->h->made[image].rates, p, c->batch, answer_key_counts(g->a, set, image),
                          &rates, &why) ||
         !stopping_rule_samples(p, &g->h->image[image], answer_key_image(g->a, set, image), by,

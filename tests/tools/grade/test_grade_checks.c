@@ -655,12 +655,57 @@ TEST(all_samples_are_right_for_a_noisy_image)
         t->h.image[0] =
             submit_render(&(struct bug){.scale = 0.6, .square = 1, .noise = noisy ? 0.25 : 1}, SPP);
         t->a.of[0][0].as_asked = reference;
-        submitted_image_expect(&t->h.image[0], &reference, SPP);
+        /* Whatever it was last held against. */
+        submitted_image_expect(&t->h.image[0], &reference, SPP / 16.0);
         snprintf(t->h.made[0].rates, sizeof t->h.made[0].rates, "%s", test_path("all.png"));
         MUST(image_write_png(t->h.made[0].rates, WIDTH, HEIGHT, red, &e));
         assert_true(grade_checks_rates(&t->g, 0, &t->r.check[0], &out, &e));
         assert_true(out.share == (noisy ? 1 : 0));
         end(t);
+    }
+}
+
+/* An image of one radiance without noise, of which every pixel takes a batch or all samples, decides whether a right image that
+ * took all of its own has points for having been stopped; a noisy one cannot tell. */
+TEST(what_never_stops_is_not_adaptive)
+{
+    static uint8_t rate[3 * PIXELS];
+    struct err e;
+    OWN(moments) flat = {0};
+    MUST(moments_alloc(&flat, WIDTH, HEIGHT, &e));
+    for (size_t i = 0; i < 3 * PIXELS; i++) {
+        flat.n[i / 3] = 24;
+        flat.mean[i] = 0.5;
+    }
+    static const struct {
+        bool early, noisy;
+        double share;
+    } cases[] = {{true, false, 1}, {false, false, 0}, {false, true, 1}};
+    for (size_t k = 0; k < COUNT(cases); k++) {
+        struct task *t = start(CHECK_EQUAL, 2, 1e-5);
+        for (size_t p = 0; p < PIXELS; p++) { /* 24 of 256, or all */
+            rate[3 * p] = cases[k].early ? 0 : 255;
+            rate[3 * p + 1] = cases[k].early ? 48 : 0;
+            rate[3 * p + 2] = cases[k].early ? 207 : 0;
+        }
+        t->r.num_checks = 2;
+        t->r.check[1] = t->r.check[0];
+        t->r.check[1].kind = CHECK_RATES;
+        t->r.check[1].images[0] = 1;
+        t->r.check[0].num_images = t->r.check[1].num_images = 1;
+        t->r.check[1].batch = 24;
+        for (int i = 0; i < 2; i++) {
+            snprintf(t->r.image[i].options, sizeof t->r.image[i].options, "-a 24 0.2");
+            t->h.image[i] = submit_render(&none, SPP);
+        }
+        t->a.of[0][1].noise = cases[k].noisy ? reference : flat;
+        t->a.of[0][1].as_asked = flat;
+        snprintf(t->h.made[1].rates, sizeof t->h.made[1].rates, "%s", test_path("stops.png"));
+        MUST(image_write_png(t->h.made[1].rates, WIDTH, HEIGHT, rate, &e));
+        OWN(result) out = run_check(t);
+        if (out.share != cases[k].share ||
+            (out.share == 0 && strstr(out.seen, "no adaptive sampling") == NULL))
+            fail_msg("case %zu: %g of the points: %s", k, out.share, out.seen);
     }
 }
 
