@@ -253,7 +253,7 @@ static const struct cli_option options[] = {
      TO(frame), .names = frame_names},
     {0, "starter", "DEFECT",
      "reproduce a defect of the assignment's starter code, for grading:\n"
-     "light-pdf, turned-lamp or beckmann; repeatable (none)",
+     "light-pdf, turned-lamp, beckmann or normals; repeatable (none)",
      .read = read_starter},
     {'q', "quiet", "", "no progress, no statistics", TO(quiet)},
     {0, "list", "", "print the accepted values of options such as --accel", TO(action), ACTION_LIST,

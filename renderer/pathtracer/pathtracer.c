@@ -123,7 +123,8 @@ static bool load_scene(const struct options *o, struct scene *scene, struct err 
     if (scene->num_dark_lights > 0 && !o->quiet)
         fprintf(stderr, "pathtracer: note: %s: %u lights have no power\n", o->scene,
                 scene->num_dark_lights);
-    cs184_deviations_apply(scene, o->starter);
+    if (!cs184_deviations_apply(scene, o->starter, e))
+        return false;
     if (o->environment_file != NULL && !scene_read_environment(scene, o->environment_file, e))
         return false;
     if (scene->num_lights == 0 && o->kind == INTEGRATE_PATHS)

@@ -57,9 +57,13 @@ INLINE vec3v triangle_normals(const struct scene *s, const struct batch *b, int 
     vec3v p = v3v(w[0][0], w[0][1], w[0][2]);
     vec3v e1 = subv(v3v(w[0][3], w[0][4], w[0][5]), p);
     vec3v e2 = subv(v3v(w[0][6], w[0][7], last[0][7]), p);
-    return interpolate_normals(v3v(w[1][0], w[1][1], w[1][2]), v3v(w[1][3], w[1][4], w[1][5]),
-                               v3v(w[1][6], w[1][7], last[1][7]), triangle_normal(e1, e2),
-                               vf_load_any(b->hit.u + k), vf_load_any(b->hit.v + k));
+    vec3v n0 = v3v(w[1][0], w[1][1], w[1][2]), n1 = v3v(w[1][3], w[1][4], w[1][5]),
+          n2 = v3v(w[1][6], w[1][7], last[1][7]);
+    vf u = vf_load_any(b->hit.u + k), v = vf_load_any(b->hit.v + k);
+    /* The side to which they are turned: none, where the starter code's are shown. */
+    vec3v side = starter_has(s, CS184_NORMALS) ? madv(madv(scalev(n0, 1 - u - v), u, n1), v, n2)
+                                               : triangle_normal(e1, e2);
+    return interpolate_normals(n0, n1, n2, side, u, v);
 }
 
 /* Stores (n + 1)/2 as radiance, n being the shading normal at the hit; black where there is none. */

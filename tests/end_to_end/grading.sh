@@ -105,6 +105,23 @@ check "of the same runs" test "$(times "$tmp/three")" = "$before"
 check "grades that are not there" sh -c '"$@" 2>&1; [ $? = 3 ]' sh "$build/assay" grade -q -o "$tmp/four" --before "$tmp/no" "$tmp/other.rubric" "$tmp/submissions"/*
 check "and nothing is graded" test ! -e "$tmp/four"
 check "what changed" grep -q '"was": 3.5' "$tmp/three/bob/grade.json"
+# A program whose Parts 1 and 2 are done and that still shows normals, as the starter code does; with other normals
+# than the starter code's it is not one.
+mkdir "$tmp/course" && cp tools/rubrics/*.dae "$tmp/course"
+{
+    sed '/^# Part 3$/,$d; /^total /d; /^bugs /d' tools/rubrics/cs184-3-1.rubric
+    sed -n '/^part 1/,/^part 3/p' tools/rubrics/cs184-3-1.rubric | sed '$d'
+} >"$tmp/course/half.rubric"
+mkdir "$tmp/half"
+for name in nia nio; do
+    mkdir "$tmp/half/$name" && cp "$build/pathtracer" "$tmp/half/$name/ours"
+    printf '#!/bin/sh\nexec ./ours "$@" --integrator normals%s\n' "$([ $name = nia ] && echo ' --starter normals')" >"$tmp/half/$name/pathtracer"
+    chmod +x "$tmp/half/$name/pathtracer"
+done
+check "programs that show normals" "$build/assay" grade -q -o "$tmp/five" "$tmp/course/half.rubric" "$tmp/half"/*
+check "keep what can be told of Parts 1 and 2: all but shadows" grep -q '^"nia",34.00,' "$tmp/five/grades.csv"
+check "and it is said" grep -q '"accepted": "normal_shading"' "$tmp/five/nia/grade.json"
+check "other normals (control)" sh -c 'grep "^\"nio\"," "$1" | grep -v "\"nio\",34.00,"' sh "$tmp/five/grades.csv"
 check "graded again" again --again
 check "of other runs (control)" test "$(times "$tmp/two")" != "$before"
 

@@ -214,15 +214,19 @@ static bool deviating(const struct rubric *r, const struct rubric_set *set, int 
                       const struct answer_options *opt, struct answer *out, struct err *e)
 {
     const struct rubric_image *p = &r->image[i];
+    const char *words = set->words;
     bool matter = false;
     for (int a = 0; a < p->num_accepted; a++)
-        if (strcmp(p->accept[a].name, set->name) == 0)
-            return read_accepted(r, p, p->accept[a].how, &out->m, e);
-    if (set->words[0] == '\0' || p->reference != REFERENCE_OURS)
+        if (strcmp(p->accept[a].name, set->name) == 0) {
+            words = p->accept[a].how;
+            if (words[0] != '-')
+                return read_accepted(r, p, words, &out->m, e);
+        }
+    if (words[0] == '\0' || p->reference != REFERENCE_OURS)
         return true;
-    return words_matter(r, p, set->words, opt, &matter, e) &&
-           (!matter || (render_ours(r, p, set->words, opt, &out->m, e) &&
-                        as_asked(r, i, set->words, opt, &out->as_asked, e)));
+    return words_matter(r, p, words, opt, &matter, e) &&
+           (!matter || (render_ours(r, p, words, opt, &out->m, e) &&
+                        as_asked(r, i, words, opt, &out->as_asked, e)));
 }
 
 bool answer_key_make(const struct rubric *r, const struct answer_options *opt,

@@ -174,9 +174,12 @@ static void check_image(const struct rubric *r, struct rubric_image *p, const st
         rubric_mistake(m, p->line, "image '%s': no file '%s' beside the rubric", p->name,
                        p->environment);
     for (int i = 0; i < p->num_accepted; i++)
-        if (!is_beside(r, p->accept[i].how))
+        if (p->accept[i].how[0] != '-' && !is_beside(r, p->accept[i].how))
             rubric_mistake(m, p->accept[i].line, "no file '%s' beside the rubric",
                            p->accept[i].how);
+        else if (p->accept[i].how[0] == '-' && p->reference != REFERENCE_OURS)
+            rubric_mistake(m, p->accept[i].line, "'%s' by options needs 'reference ours'",
+                           p->accept[i].name);
     if (!p->used)
         rubric_mistake(m, p->line, "image '%s' is in no check", p->name);
 }
@@ -275,7 +278,7 @@ static void append(char *text, size_t size, const char *between, const char *mor
     text_append(text, size, "%s%s", text[0] != '\0' ? between : "", more);
 }
 
-/* Lists all combinations of deviations given by options, then those given by images. */
+/* Lists all combinations of deviations of the whole program, then those of some images. */
 static void list_sets(struct rubric *r, struct rubric_mistakes *m)
 {
     r->num_sets = 1 << r->num_accepted;

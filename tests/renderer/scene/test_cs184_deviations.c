@@ -14,7 +14,7 @@ static struct scene lamp(float width, float depth, float height, unsigned bits)
     build_quad(&s, v3(-width / 2, height, -depth / 2), v3(width, 0, 0), v3(0, 0, depth), m);
     MUST(scene_finish(&s, "test", &e));
     assert_int_equal(s.num_lights, 1);
-    cs184_deviations_apply(&s, bits);
+    MUST(cs184_deviations_apply(&s, bits, &e));
     return s;
 }
 
@@ -94,6 +94,32 @@ TEST(a_lamp_that_is_turned)
     assert_true(fabs(irradiance(0.5f, 2, 1, p, false) / got - 1) > 0.1);
 }
 
+/* A tetrahedron about the origin, whose normals are those of its corners by symmetry, and a triangle alone, whose normals point to
+ * its back: those of the file, all (0, 1, 0), are not used. */
+TEST(normals_of_the_half_edge_mesh)
+{
+    static const vec3 corner[4] = {{1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-1, -1, 1}};
+    static const int face[4][3] = {{1, 3, 2}, {0, 2, 3}, {0, 3, 1}, {0, 1, 2}};
+    struct err e = {""};
+    OWN(scene) s = build_scene();
+    uint32_t m = build_material(&s, grey(0.5f), grey(0));
+    for (int f = 0; f < 4; f++)
+        build_triangle(&s, corner[face[f][0]], corner[face[f][1]], corner[face[f][2]], m);
+    build_triangle(&s, v3(5, 0, 0), v3(5, 0, 1), v3(6, 0, 0), m);
+    for (uint32_t t = 0; t < s.num_triangles; t++)
+        s.tri_object[t] = t / 4;
+    for (uint32_t i = 0; i < 3 * s.num_triangles; i++)
+        s.normal[i] = v3(0, 1, 0);
+    MUST(cs184_deviations_apply(&s, 1u << CS184_NORMALS, &e));
+    for (int i = 0; i < 15; i++) {
+        vec3 want = i < 12 ? normalize(corner[face[i / 3][i % 3]]) : v3(0, -1, 0),
+             off = sub(s.normal[i], want);
+        if (dot(off, off) > 1e-12f)
+            fail_msg("corner %d: %g %g %g", i, (double)s.normal[i].x, (double)s.normal[i].y,
+                     (double)s.normal[i].z);
+    }
+}
+
 /* Only lamps of two triangles are rectangles. */
 TEST(other_lamps_stay)
 {
@@ -101,6 +127,6 @@ TEST(other_lamps_stay)
     OWN(scene) s = build_scene();
     build_triangle(&s, v3(0, 1, 0), v3(1, 1, 0), v3(0, 1, 1), build_material(&s, grey(0), grey(1)));
     MUST(scene_finish(&s, "test", &e));
-    cs184_deviations_apply(&s, 1u << CS184_TURNED_LAMP);
+    MUST(cs184_deviations_apply(&s, 1u << CS184_TURNED_LAMP, &e));
     assert_true(s.position[1].x == 1 && s.position[1].z == 0 && s.position[2].z == 1);
 }

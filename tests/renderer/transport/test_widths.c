@@ -294,8 +294,9 @@ TEST(defects_of_the_starter_code)
     struct scene (*const make[])(void) = {all_kinds, mesh_lamp};
     for (int which = 0; which < 2; which++) {
         OWN(scene) s = make[which]();
+        struct err e;
         complete(&s, false);
-        cs184_deviations_apply(&s, (1u << NUM_CS184_DEVIATIONS) - 1);
+        MUST(cs184_deviations_apply(&s, (1u << NUM_CS184_DEVIATIONS) - 1, &e));
         compare(&s, (struct how){.opt = {.direct = DIRECT_LIGHT,
                                          .max_bounces = 3,
                                          .light_samples = 1,

@@ -126,7 +126,7 @@ TEST(the_shipped_ones_are_right)
         "tools/rubrics/cs184-3-2.rubric", "tools/rubrics/template.rubric",
         "tools/rubrics/deviations.rubric"};
     static const double points[] = {100, 100, 100, 10, 10};
-    static const int sets[] = {2, 2, 4, 1, 8};
+    static const int sets[] = {3, 3, 4, 1, 8};
     struct err e;
     for (int i = 0; i < 5; i++) {
         assert_true(rubric_read(paths[i], suite_shipped(), 0, rubric, &mistakes, &e));
@@ -201,6 +201,7 @@ TEST(each_mistake_is_named_with_its_line)
         {1, 3, "rubric a\naccept x -a\naccept x -b", "already accepted in line 2"},
         {1, 5, "rubric a\naccept x a\naccept y b\naccept z c\naccept t d", "more than 3"},
         {7, 8, " reference truth\n accept x nowhere.exr", "no file"},
+        {7, 8, " reference truth\n accept x --fresnel schlick", "needs 'reference ours'"},
         {2, 2, "image p/q", "no name"},
         {3, 2, " scene 99_nothing", "no scene"},
         {3, 2, " scene nowhere.dae", "no file"},
