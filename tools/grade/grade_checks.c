@@ -376,7 +376,10 @@ bool grade_checks_run(const struct grading *g, const struct rubric_check *check,
         out->judged = g->h->made[i].end != SANDBOX_LOST;
         return true;
     }
-    bool ok = judging_expect_noise(&w, e) && kinds[check->kind](&w, out, e);
+    bool ok = true;
+    for (int k = 0; ok && k < check->num_images; k++)
+        ok = judging_expect_noise(g, set, check->images[k], e);
+    ok = ok && kinds[check->kind](&w, out, e);
     free(w.use);
     submitted_image_free(&w.compare[0]);
     submitted_image_free(&w.compare[1]);

@@ -99,12 +99,11 @@ bool grade_checks_rates(const struct grading *g, int set, const struct rubric_ch
                         struct result *out, struct err *e)
 {
     int image = c->images[0];
-    const struct judging w = {.g = g, .check = c, .set = set};
     const struct rubric_image *p = &g->r->image[image];
     struct stopping by[NUM_STOPPING_KINDS];
     struct rate_image rates;
     struct err why; /* of the image: grade_checks_judge_rates() has reported it */
-    if (!judging_expect_noise(&w, e))
+    if (!judging_expect_noise(g, set, image, e))
         return false;
     if (!rate_image_read(g->h->made[image].rates, p, c->batch, answer_key_counts(g->a, set, image),
                          &rates, &why) ||

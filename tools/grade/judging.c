@@ -21,10 +21,15 @@ const struct moments *judging_reference(const struct judging *w, int k)
     return answer_key_image(w->g->a, w->set, w->check->images[k]);
 }
 
+static const struct moments *expected(const struct grading *g, int set, int image)
+{
+    const struct moments *own = &g->a->of[set][image].m;
+    return own->width > 0 ? own : &g->a->of[0][image].noise;
+}
+
 const struct moments *judging_expected(const struct judging *w, int k)
 {
-    const struct moments *own = &w->g->a->of[w->set][w->check->images[k]].m;
-    return own->width > 0 ? own : &w->g->a->of[0][w->check->images[k]].noise;
+    return expected(w->g, w->set, w->check->images[k]);
 }
 
 bool judging_masks(const struct judging *w, const struct submitted_image *s, size_t p)
@@ -142,25 +147,21 @@ static void scale_noise(struct submitted_image *s, const double *count, double s
         scale_noise(&s->run[k], count, spp);
 }
 
-bool judging_expect_noise(const struct judging *w, struct err *e)
+bool judging_expect_noise(const struct grading *g, int set, int image, struct err *e)
 {
-    for (int k = 0; k < w->check->num_images; k++) {
-        const struct rubric_image *p = judging_image(w, k);
-        struct submitted_image *s = &w->g->h->image[w->check->images[k]];
-        const struct made *made = &w->g->h->made[w->check->images[k]];
-        struct err no_rates;
-        submitted_image_expect(s, judging_expected(w, k), p->spp);
-        if (made->rates[0] == '\0' || !rubric_is_adaptive(p))
-            continue;
-        double *count = calloc((size_t)s->width * (size_t)s->height, sizeof *count);
-        if (count == NULL)
-            return err_set(e, "out of memory");
-        bool known = rate_image_counts(made->rates, p, count, &no_rates);
-        if (known)
-            scale_noise(s, count, p->spp);
-        free(count);
-        if (!known && err_is_of_memory(&no_rates))
-            return err_set(e, "%s", no_rates.msg);
-    }
-    return true;
+    const struct rubric_image *p = &g->r->image[image];
+    const struct made *made = &g->h->made[image];
+    struct submitted_image *s = &g->h->image[image];
+    struct err no_rates = {""};
+    submitted_image_expect(s, expected(g, set, image), p->spp);
+    if (made->rates[0] == '\0' || !rubric_is_adaptive(p))
+        return true;
+    double *count = calloc((size_t)s->width * (size_t)s->height, sizeof *count);
+    if (count == NULL)
+        return err_set(e, "out of memory");
+    bool known = rate_image_counts(made->rates, p, count, &no_rates);
+    if (known)
+        scale_noise(s, count, p->spp);
+    free(count);
+    return known || !err_is_of_memory(&no_rates) || err_set(e, "%s", no_rates.msg);
 }

@@ -27,8 +27,9 @@ bool judging_masks(const struct judging *w, const struct submitted_image *s, siz
 /* Can more samples be had of all its images? */
 bool judging_can_buy(const struct judging *w);
 
-/* Sets the noise that the student's images should have; call it before the functions below. */
-NODISCARD bool judging_expect_noise(const struct judging *w, struct err *e);
+/* Sets the noise that a student's image should have, if it shows the deviations of `set`; call it before
+ * the functions below and those of stopping_rule.h. Fails only out of memory. */
+NODISCARD bool judging_expect_noise(const struct grading *g, int set, int image, struct err *e);
 
 /* Fills w->use, the pixels that can be compared, which the caller frees, and out->noise. Around the
  * clipping point a program that is noisier than ours loses more pixels. If fewer than 30 % would be

@@ -1,6 +1,6 @@
 #include "rubric_bugs.h"
 
-#include "stopping_rule.h"
+#include "judging.h"
 
 #include "renderer/base/fs.h"
 #include "renderer/base/sha256.h"
@@ -169,6 +169,8 @@ static bool expect_samples(const struct grading *g, int set, int image, struct s
     struct err why;
     if (isnan(clue->seen.fact[FACT_SAMPLES]))
         return true;
+    if (!judging_expect_noise(g, set, image, e))
+        return false;
     if (is_clipped(&g->h->image[image]))
         clue->seen.fact[FACT_SAMPLES] = NAN;
     else if (!stopping_rule_samples(&g->r->image[image], &g->h->image[image],

@@ -58,6 +58,8 @@ static const struct {
     {"//light[not(" KIND "[self::area or self::point or self::directional or self::ambient]"
      "[numbers(color) = 3])]",
      "a light is area, point, directional or ambient, with a color"},
+    {"//light[extra/technique/@profile != 'CGL' or not(extra/technique)]",
+     "a light has an extra of CGL: the starter code of 2025 crashes without one"},
     {"//light[" KIND "[self::point][numbers(constant_attenuation) != 1 or "
      "numbers(linear_attenuation) != 1 or numbers(quadratic_attenuation) != 1]]",
      "a point light has all three attenuations"},
