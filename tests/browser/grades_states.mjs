@@ -30,7 +30,7 @@ edit("gus", (g) => {
   Object.assign(g.checks[0], { points: 1.5, share: 0.375, carried: "the lamp is half as bright", flag: "point is a copy of the reference", visibility: "hidden" });
   Object.assign(g, { points: 1.5, accepted: "light_pdf", located: "only in light that bounced off a wall first", located_picture: "cornell",
     before: { points: 4, of: 10, checks: [{ name: "point", was: 4, is: 1.5 }] },
-    diagnosis: { finding: "bug", gate: "the box is too dark", with: "", named: [
+    diagnosis: { finding: "bug", gate: "the box is too dark", with: "", parts: [], named: [
       { name: "no_bounces", bug: "indirect light is not added", where: "Part 4", explained: 0.93, and: "inverse_r", and_bug: "light falls as 1/r", and_where: "Part 3" },
       { name: "one_bounce", bug: "only one bounce is traced", where: "Part 4", explained: 0.91 }] } });
   g.parts[0].points = 1.5;

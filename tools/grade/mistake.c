@@ -33,6 +33,25 @@ static bool is_seen(const struct grading *g)
     return false;
 }
 
+/* Each part that lost points by itself. Only a bug of that part's own code is believed: images that are
+ * black, or wrong by a mistake of an earlier part, resemble many others. */
+static bool diagnose_parts(const struct grading *g, int set, const double *share,
+                           struct mistake *out, struct err *e)
+{
+    for (int p = 0; out->looked && p < g->r->num_parts; p++) {
+        struct diagnosis *d = &out->of_part[p];
+        bool lost = false;
+        for (int i = 0; i < g->r->num_checks; i++)
+            lost = lost || (g->r->check[i].part == p && share[i] < 1);
+        if (lost && !rubric_bugs_diagnose_part(g, set, p, d, e))
+            return false;
+        for (int i = 0; i < d->num_named; i++)
+            if (carried_part_of(g->r, &g->bugs->catalogue.bug[d->candidate[i].bug]) != p)
+                d->num_named = 0;
+    }
+    return true;
+}
+
 bool mistake_judge(const struct grading *g, int *set, struct result *result, struct mistake *out,
                    struct err *e)
 {
@@ -62,6 +81,8 @@ bool mistake_judge(const struct grading *g, int *set, struct result *result, str
             snprintf(out->found.gate, sizeof out->found.gate,
                      "no known bug, nor two of them, explains the images");
         out->found.finding = FINDING_UNKNOWN;
+        if (!diagnose_parts(g, *set, share, out, e))
+            return false;
         out->located = located_by(g, share);
     }
     return carried_by_ratio(g, *set, share, paid, result, e);

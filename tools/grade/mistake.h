@@ -13,6 +13,7 @@ struct mistake {
     int with;               /* the deviations on top of which */
     char why[200];          /* why there is no diagnosis; or "" */
     struct located located; /* set where no bug is named */
+    struct diagnosis of_part[RUBRIC_PARTS]; /* likewise: a bug of that part's code, by its images alone */
 };
 
 /* result: all checks, as graded with the deviations of *set; points lost by a mistake that another

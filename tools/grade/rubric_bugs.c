@@ -212,12 +212,23 @@ static bool expect_samples(const struct grading *g, int set, int image, struct s
     return true;
 }
 
-static bool look(const struct grading *g, int set, struct sights *out, struct err *e)
+/* The part of the first check of an image. */
+static int part_of(const struct rubric *r, int image)
+{
+    int part = -1;
+    for (int i = 0; i < r->num_checks && part < 0; i++)
+        for (int k = 0; k < r->check[i].num_images; k++)
+            part = r->check[i].images[k] == image ? r->check[i].part : part;
+    return part;
+}
+
+/* part -1: at the images of all. */
+static bool look(const struct grading *g, int set, int part, struct sights *out, struct err *e)
 {
     forget(out);
     out->bugs = g->bugs->catalogue.num_bugs;
     for (int i = 0; i < g->r->num_images; i++)
-        if (rubric_bugs_can_observe(g, set, i) &&
+        if ((part < 0 || part_of(g->r, i) == part) && rubric_bugs_can_observe(g, set, i) &&
             (!rubric_bugs_observe(g, set, i, &out->clue[out->num++], e) ||
              (rubric_sight_counts(g->r, i) && !expect_samples(g, set, i, out, e))))
             return false;
@@ -236,7 +247,7 @@ static bool likeliest_set(const struct grading *g, int first, bool only,
     for (int k = 0; ok && k < g->r->num_sets && (k == 0 || !only); k++) {
         int tried = k == 0 ? first : k <= first ? k - 1 : k;
         struct diagnosis other;
-        ok = look(g, tried, seen, e);
+        ok = look(g, tried, -1, seen, e);
         if (!ok || seen->num == 0)
             break;
         ok = diagnose(c, seen->clue, seen->num, opt, &other, e);
@@ -258,14 +269,35 @@ static bool likeliest_set(const struct grading *g, int first, bool only,
     return ok;
 }
 
+static struct diagnose_options options_of(const struct grading *g)
+{
+    double clip = rubric_sight_clip(g->r);
+    return (struct diagnose_options){
+        .alpha = g->alpha, .by_likelihood = true, .clip = isfinite(clip) ? clip : 0};
+}
+
+bool rubric_bugs_diagnose_part(const struct grading *g, int set, int part, struct diagnosis *found,
+                               struct err *e)
+{
+    struct diagnose_options opt = options_of(g);
+    struct sights *seen = calloc(1, sizeof *seen);
+    *found = (struct diagnosis){0};
+    if (seen == NULL)
+        return err_set(e, "out of memory");
+    opt.alpha /= g->r->num_parts;
+    bool ok =
+        look(g, set, part, seen, e) &&
+        (seen->num == 0 || diagnose(&g->bugs->catalogue, seen->clue, seen->num, &opt, found, e));
+    forget(seen);
+    free(seen);
+    return ok;
+}
+
 bool rubric_bugs_diagnose(const struct grading *g, int set, const char *without,
                           struct diagnosis *found, int *with, struct err *e)
 {
-    double clip = rubric_sight_clip(g->r);
-    struct diagnose_options opt = {.alpha = g->alpha,
-                                   .without = without,
-                                   .by_likelihood = true,
-                                   .clip = isfinite(clip) ? clip : 0};
+    struct diagnose_options opt = options_of(g);
+    opt.without = without;
     struct sights *seen = calloc(1, sizeof *seen);
     *found = (struct diagnosis){0};
     *with = set;

@@ -109,6 +109,11 @@ static void bugs_of(FILE *f, const json_t *g)
         html_print(f, " on top of %s", with);
     if (k == 0)
         html_text(f, member_text(g, "located"));
+    json_each(part, json_object_get(json_object_get(g, "diagnosis"), "parts")) {
+        html_print(f, "; Part %s: ", member_text(part, "part"));
+        json_array_foreach(json_object_get(part, "named"), k, b)
+            html_print(f, "%s%s", k > 0 ? " or " : "", member_text(b, "bug"));
+    }
 }
 
 static void row(FILE *f, const json_t *g, size_t parts)

@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-static json_t *finding_json(const struct catalogue *c, const struct diagnosis *found)
+static json_t *named_json(const struct catalogue *c, const struct diagnosis *found)
 {
     json_t *named = json_array();
     for (int i = 0; i < found->num_named; i++) {
@@ -21,8 +21,18 @@ static json_t *finding_json(const struct catalogue *c, const struct diagnosis *f
         }
         json_array_append_new(named, entry);
     }
-    return json_pack("{ss, ss, so}", "finding", found->finding == FINDING_BUG ? "bug" : "unknown",
-                     "gate", found->gate, "named", named);
+    return named;
+}
+
+static json_t *parts_json(const struct catalogue *c, const struct rubric *r,
+                          const struct mistake *m)
+{
+    json_t *parts = json_array();
+    for (int p = 0; p < r->num_parts; p++)
+        if (m->of_part[p].num_named > 0)
+            json_array_append_new(parts, json_pack("{ss, so}", "part", r->part[p].number, "named",
+                                                   named_json(c, &m->of_part[p])));
+    return parts;
 }
 
 json_t *grade_diagnose_by_images(const struct rubric_bugs *b, const struct rubric *r,
@@ -30,7 +40,9 @@ json_t *grade_diagnose_by_images(const struct rubric_bugs *b, const struct rubri
 {
     if (!m->looked)
         return m->why[0] != '\0' ? json_pack("{ss}", "error", m->why) : json_null();
-    json_t *json = finding_json(&b->catalogue, &m->found);
-    json_object_set_new(json, "with", json_string(r->set[m->with].name));
-    return json;
+    const struct catalogue *c = &b->catalogue;
+    return json_pack("{ss, ss, so, so, ss}", "finding",
+                     m->found.finding == FINDING_BUG ? "bug" : "unknown", "gate", m->found.gate,
+                     "named", named_json(c, &m->found), "parts", parts_json(c, r, m), "with",
+                     r->set[m->with].name);
 }

@@ -13,6 +13,21 @@ bool grade_summary_shows(const json_t *check, bool staff)
     return staff || strcmp(member_or_empty(check, "visibility"), "visible") == 0;
 }
 
+/* "Part 4 by itself looks like ...". */
+static void parts_by_themselves(FILE *f, const json_t *diagnosis)
+{
+    json_each(part, json_object_get(diagnosis, "parts")) {
+        const char *between = " by itself looks like";
+        html_print(f, "<p>Part %s", member_text(part, "part"));
+        json_each(b, json_object_get(part, "named")) {
+            html_print(f, "%s <b>%s</b> <span class=\"where\">(%s)</span>", between,
+                       member_text(b, "bug"), member_text(b, "where"));
+            between = ", or";
+        }
+        fputs(".</p>\n", f);
+    }
+}
+
 /* The named bug with what it is called where, or where what is wrong shows. */
 void grade_summary_bug(FILE *f, const json_t *grade)
 {
@@ -41,13 +56,17 @@ void grade_summary_bug(FILE *f, const json_t *grade)
     } else if (located[0] != '\0') {
         html_print(
             f,
-            "<div class=\"finding\"><p>No known mistake explains it. It shows <b>%s</b>.</p></div>\n",
+            "<div class=\"finding\"><p>No known mistake explains all of it. It shows <b>%s</b>.</p>\n",
             located);
+        parts_by_themselves(f, diagnosis);
+        fputs("</div>\n", f);
     } else if (strcmp(member_or_empty(diagnosis, "finding"), "unknown") == 0) {
         fputs(
             "<div class=\"finding\"><p>The images differ from the right ones in a way that no known mistake "
-            "explains.</p></div>\n",
+            "explains.</p>\n",
             f);
+        parts_by_themselves(f, diagnosis);
+        fputs("</div>\n", f);
     }
 }
 

@@ -85,6 +85,14 @@ static void describe_whole(const json_t *grade, char *out, size_t size)
         if (and[0] != '\0')
             text_append(out, size, ", and with it %s (%s)", and, member_or_empty(b, "and_where"));
     }
+    json_each(part, json_object_get(diagnosis, "parts")) {
+        text_append(out, size, "%sPart %s by itself looks like: ",
+                    out[0] != '\0' && out[strlen(out) - 1] != '\n' ? "\n" : "",
+                    member_or_empty(part, "part"));
+        json_array_foreach(json_object_get(part, "named"), i, b)
+            text_append(out, size, "%s%s (%s)", i > 0 ? ", or " : "", member_or_empty(b, "bug"),
+                        member_or_empty(b, "where"));
+    }
 }
 
 /* Wall time of the first run of each image, summed. */

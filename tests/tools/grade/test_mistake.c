@@ -273,6 +273,37 @@ static struct submitted_images *hand_in_same(int like, uint8_t level)
     return h;
 }
 
+/* An unknown mistake of Part 2 and a known one of Part 4: no bug explains all images, those of Part 4 one does. Without direct
+ * light (unknown, too) images of Part 3 look like those of a program that leaves out the last bounce, which is no bug of Part 3. */
+TEST(a_part_is_named_by_itself)
+{
+    static struct effect *kept[2][256];
+    const int unknown = bug_images_number(&of, "bvh_misses_flat_boxes"),
+              known_one = bug_images_number(&of, "indirect_twice"),
+              black = bug_images_number(&of, "shadow_ray_without_end");
+    for (int k = 0; k < 2; k++) {
+        const int second = k == 0 ? known_one : black;
+        struct submitted_images *h = bug_images_hand_in(&of, 0, unknown, second, 1);
+        forget(unknown, kept[0]);
+        if (k == 1)
+            forget(black, kept[1]);
+        struct outcome v = grade(h);
+        remember(unknown, kept[0]);
+        if (k == 1)
+            remember(black, kept[1]);
+        bug_images_take_back(&of, h);
+        assert_int_equal(v.mistake.found.num_named, 0);
+        assert_true(lost(&v, "2", false) && lost(&v, k == 0 ? "4" : "3", false));
+        for (int p = 0; p < of.rubric->num_parts; p++) {
+            const struct diagnosis *d = &v.mistake.of_part[p];
+            bool expected = k == 0 && strcmp(of.rubric->part[p].number, "4") == 0;
+            if (d->num_named != expected || (expected && d->candidate[0].bug != known_one))
+                fail_msg("Part %s: %d named, the first %s", of.rubric->part[p].number, d->num_named,
+                         d->num_named > 0 ? of.bugs.catalogue.bug[d->candidate[0].bug].name : "-");
+        }
+    }
+}
+
 TEST(one_image_for_all_is_not_carried_on)
 {
     const int like[] = {-1, -1, -1, image_number("corner")}, level[] = {0, 120, 240, 0};
