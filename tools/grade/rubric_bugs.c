@@ -235,9 +235,10 @@ static bool look(const struct grading *g, int set, int part, struct sights *out,
     return true;
 }
 
-/* Diagnoses the images with the set of deviations that makes them likeliest. Tries `first`, and
- * then the others, unless `only`, or a single bug already explains the images with `first`. */
-static bool likeliest_set(const struct grading *g, int first, bool only,
+/* Diagnoses the images (part -1: all) with the set of deviations that makes them likeliest. Tries
+ * `first`, and then the others, unless `only`, or a single bug already explains the images with
+ * `first`. */
+static bool likeliest_set(const struct grading *g, int first, bool only, int part,
                           const struct diagnose_options *opt, struct sights *seen,
                           struct diagnosis *found, int *with, struct err *e)
 {
@@ -247,7 +248,7 @@ static bool likeliest_set(const struct grading *g, int first, bool only,
     for (int k = 0; ok && k < g->r->num_sets && (k == 0 || !only); k++) {
         int tried = k == 0 ? first : k <= first ? k - 1 : k;
         struct diagnosis other;
-        ok = look(g, tried, -1, seen, e);
+        ok = look(g, tried, part, seen, e);
         if (!ok || seen->num == 0)
             break;
         ok = diagnose(c, seen->clue, seen->num, opt, &other, e);
@@ -285,9 +286,8 @@ bool rubric_bugs_diagnose_part(const struct grading *g, int set, int part, struc
     if (seen == NULL)
         return err_set(e, "out of memory");
     opt.alpha /= g->r->num_parts;
-    bool ok =
-        look(g, set, part, seen, e) &&
-        (seen->num == 0 || diagnose(&g->bugs->catalogue, seen->clue, seen->num, &opt, found, e));
+    int with;
+    bool ok = likeliest_set(g, set, false, part, &opt, seen, found, &with, e);
     forget(seen);
     free(seen);
     return ok;
@@ -303,10 +303,10 @@ bool rubric_bugs_diagnose(const struct grading *g, int set, const char *without,
     *with = set;
     if (seen == NULL)
         return err_set(e, "out of memory");
-    bool ok = likeliest_set(g, set, false, &opt, seen, found, with, e);
+    bool ok = likeliest_set(g, set, false, -1, &opt, seen, found, with, e);
     /* Two bugs at once: with the set of the single bug that was named, else with any set. */
     opt.pairs = true;
-    ok = ok && likeliest_set(g, *with, found->num_named > 0, &opt, seen, found, with, e);
+    ok = ok && likeliest_set(g, *with, found->num_named > 0, -1, &opt, seen, found, with, e);
     forget(seen);
     free(seen);
     return ok;
