@@ -280,6 +280,7 @@ static struct diagnose_options options_of(const struct grading *g)
 bool rubric_bugs_diagnose_part(const struct grading *g, int set, int part, struct diagnosis *found,
                                struct err *e)
 {
+    static const double black = 0.01; /* of the right image's mean */
     struct diagnose_options opt = options_of(g);
     struct sights *seen = calloc(1, sizeof *seen);
     *found = (struct diagnosis){0};
@@ -288,6 +289,10 @@ bool rubric_bugs_diagnose_part(const struct grading *g, int set, int part, struc
     opt.alpha /= g->r->num_parts;
     int with;
     bool ok = likeliest_set(g, set, false, part, &opt, seen, found, &with, e);
+    for (int k = 0; k < seen->num; k++)
+        if (signature_mean(&seen->clue[k].seen) <
+            black * signature_mean(&seen->clue[k].view->correct))
+            *found = (struct diagnosis){0};
     forget(seen);
     free(seen);
     return ok;

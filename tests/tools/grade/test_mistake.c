@@ -273,8 +273,8 @@ static struct submitted_images *hand_in_same(int like, uint8_t level)
     return h;
 }
 
-/* An unknown mistake of Part 2 and a known one of Part 4: no bug explains all images, those of Part 4 one does. Without direct
- * light (unknown, too) images of Part 3 look like those of a program that leaves out the last bounce, which is no bug of Part 3. */
+/* An unknown mistake of Part 2 and a known one of Part 4: no bug explains all images, those of Part 4 one does; it explains those
+ * of Part 5 as well, but is no bug of that. Black images (without direct light, unknown, too) are explained by several bugs. */
 TEST(a_part_is_named_by_itself)
 {
     static struct effect *kept[2][256];
