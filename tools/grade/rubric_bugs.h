@@ -48,8 +48,9 @@ NODISCARD bool rubric_bugs_observe(const struct grading *g, int set, int image,
 NODISCARD bool rubric_bugs_diagnose(const struct grading *g, int set, const char *without,
                                     struct diagnosis *found, int *with, struct err *e);
 
-/* The same by the images that checks of one part have and none of an earlier part, and by a single bug: a program with a mistake in each part is explained by no bug, and by no pair of them. Not
- * FINDING_BUG where no image of the part can be compared, and where one is black, for which there are many reasons. */
+/* The same by the images that checks of one part have and none of an earlier part, and by a single bug: a
+ * program with a mistake in each part is explained by no bug, and by no pair of them. Not FINDING_BUG where
+ * no image of the part can be compared, and where one is black, for which there are many reasons. */
 NODISCARD bool rubric_bugs_diagnose_part(const struct grading *g, int set, int part,
                                          struct diagnosis *found, struct err *e);
 

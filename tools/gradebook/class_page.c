@@ -107,10 +107,14 @@ static void bugs_of(FILE *f, const json_t *g)
     const char *with = member_or_empty(json_object_get(g, "diagnosis"), "with");
     if (k > 0 && with[0] != '\0' && strcmp(with, member_or_empty(g, "accepted")) != 0)
         html_print(f, " on top of %s", with);
-    if (k == 0)
+    const char *between = "";
+    if (k == 0 && member_text(g, "located") != NULL) {
         html_text(f, member_text(g, "located"));
+        between = "; ";
+    }
     json_each(part, json_object_get(json_object_get(g, "diagnosis"), "parts")) {
-        html_print(f, "; Part %s: ", member_text(part, "part"));
+        html_print(f, "%sPart %s: ", between, member_text(part, "part"));
+        between = "; ";
         json_array_foreach(json_object_get(part, "named"), k, b)
             html_print(f, "%s%s", k > 0 ? " or " : "", member_text(b, "bug"));
     }
