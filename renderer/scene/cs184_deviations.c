@@ -1,7 +1,6 @@
 #include "cs184_deviations.h"
 
 #include <stdlib.h>
-#include <string.h>
 
 const char *const cs184_deviation_names[NUM_CS184_DEVIATIONS + 1] = {"light-pdf", "turned-lamp",
                                                                      "beckmann", "normals", NULL};
@@ -38,19 +37,26 @@ struct corner {
     vec3 p;
 };
 
+static int compare_places(vec3 a, vec3 b)
+{
+    if (a.x != b.x)
+        return a.x < b.x ? -1 : 1;
+    return a.y != b.y ? (a.y < b.y ? -1 : 1) : (a.z > b.z) - (a.z < b.z);
+}
+
 static int compare_corners(const void *a, const void *b)
 {
     const struct corner *c = a, *d = b;
     if (c->object != d->object)
         return c->object < d->object ? -1 : 1;
-    int by_place = memcmp(&c->p, &d->p, sizeof c->p);
+    int by_place = compare_places(c->p, d->p);
     return by_place != 0 ? by_place : (c->at > d->at) - (c->at < d->at);
 }
 
 /* The place of the next corner of its triangle, or of the one after. */
-static const vec3 *neighbour(const struct scene *s, const struct corner *c, uint32_t step)
+static vec3 neighbour(const struct scene *s, const struct corner *c, uint32_t step)
 {
-    return &s->position[c->at / 3 * 3 + (c->at + step) % 3];
+    return s->position[c->at / 3 * 3 + (c->at + step) % 3];
 }
 
 /* Is there an edge at this vertex (num corners) that a single triangle has? */
@@ -59,7 +65,7 @@ static bool is_boundary(const struct scene *s, const struct corner *c, size_t nu
     for (size_t i = 0; i < num; i++) {
         bool shared = false;
         for (size_t k = 0; k < num && !shared; k++)
-            shared = memcmp(neighbour(s, &c[i], 1), neighbour(s, &c[k], 2), sizeof(vec3)) == 0;
+            shared = compare_places(neighbour(s, &c[i], 1), neighbour(s, &c[k], 2)) == 0;
         if (!shared)
             return true;
     }
@@ -78,10 +84,10 @@ static bool use_mesh_normals(struct scene *s, struct err *e)
     for (size_t first = 0, end; first < num; first = end) {
         vec3 n = v3(0, 0, 0);
         for (end = first; end < num && c[end].object == c[first].object &&
-                          memcmp(&c[end].p, &c[first].p, sizeof(vec3)) == 0;
+                          compare_places(c[end].p, c[first].p) == 0;
              end++)
-            n = add(n, cross(sub(*neighbour(s, &c[end], 1), c[end].p),
-                             sub(*neighbour(s, &c[end], 2), c[end].p)));
+            n = add(n, cross(sub(neighbour(s, &c[end], 1), c[end].p),
+                             sub(neighbour(s, &c[end], 2), c[end].p)));
         n = is_boundary(s, c + first, end - first) ? scale(n, -1) : n;
         for (size_t i = first; i < end && dot(n, n) > 0; i++)
             s->normal[c[i].at] = normalize(n);
