@@ -77,15 +77,19 @@ static bool add_image(const struct crew *w, const struct povray_image *p, const 
 
 enum { MAX_STARTS = 10 /* of one image */ };
 
-/* On a busy machine POV-Ray may give up before rendering because its threads start too slowly. That says
- * nothing about the image, so it is started again. */
+/* On a busy machine POV-Ray may give up before rendering because its threads start too slowly, or crash
+ * while it parses (one of 1500 small runs with four processes for each processor). That says nothing about
+ * the image, so it is started again. */
 static bool run_engine(const struct process *run, struct err *e)
 {
     for (int attempt = 1;; attempt++) {
         if (process_run(run, NULL, e))
             return true;
-        if (attempt == MAX_STARTS ||
-            strstr(e->msg, "Timed out waiting for worker thread startup") == NULL)
+        bool gave_up = strstr(e->msg, "Timed out waiting for worker thread startup") != NULL,
+             crashed = strstr(e->msg, "killed by signal 11") != NULL &&
+                       strstr(e->msg, "[Parsing...]") != NULL &&
+                       strstr(e->msg, "[Rendering...]") == NULL;
+        if (attempt == MAX_STARTS || !(gave_up || crashed))
             return false;
     }
 }

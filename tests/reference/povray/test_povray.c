@@ -190,22 +190,32 @@ TEST(test_engine_failures)
     engine_fails("true", 60, (const char *[]){"scene.exr", NULL});
 }
 
-/* The one failure that is tried again, ten times at most: the script leaves a line in its count for
- * each start, with the image's directory. */
+/* What slow threads do is tried again, ten times at most; a crash while rendering is not. The script leaves a line in its
+ * count for each start, with the image's directory. */
 TEST(test_slow_start_is_tried_again)
 {
+    static const struct {
+        const char *script, *says;
+        int starts;
+    } cases[] = {
+        {"echo Timed out waiting for worker thread startup; exit 1", "worker thread startup", 10},
+        {"echo '==== [Parsing...] ===='; kill -SEGV $$", "signal 11", 10},
+        {"echo '==== [Parsing...] ===='; echo '==== [Rendering...] ===='; kill -SEGV $$",
+         "signal 11", 1}};
     const char *count = test_path("count");
-    char script[256];
-    snprintf(script, sizeof script,
-             "pwd >>%s; echo Timed out waiting for worker thread startup; exit 1", count);
-    engine_fails(script, 60, (const char *[]){"exit status 1", "worker thread startup", NULL});
-    char *lines = test_read(count);
-    const size_t first = strcspn(lines, "\n") + 1;
-    int starts = 0;
-    for (const char *at = lines; *at != '\0'; at += strcspn(at, "\n") + 1)
-        starts += strncmp(at, lines, first) == 0;
-    free(lines);
-    assert_int_equal(starts, 10);
+    for (size_t k = 0; k < COUNT(cases); k++) {
+        char script[256];
+        snprintf(script, sizeof script, "pwd >>%s; %s", count, cases[k].script);
+        engine_fails(script, 60, (const char *[]){cases[k].says, NULL});
+        char *lines = test_read(count);
+        const size_t first = strcspn(lines, "\n") + 1;
+        int starts = 0;
+        for (const char *at = lines; *at != '\0'; at += strcspn(at, "\n") + 1)
+            starts += strncmp(at, lines, first) == 0;
+        free(lines);
+        assert_int_equal(unlink(count), 0);
+        assert_int_equal(starts, cases[k].starts);
+    }
 }
 
 /* A grey image of side x side for the fakes to hand out. */
