@@ -102,7 +102,7 @@ check "its points" points bob 8.50
 check "of the same runs" test "$(times "$tmp/two")" = "$before"
 check "the appeal withdrawn, beside what was" "$build/assay" grade -q -o "$tmp/three" --before "$tmp/two" "$tmp/other.rubric" "$tmp/submissions"/*
 check "of the same runs" test "$(times "$tmp/three")" = "$before"
-check "grades that are not there" sh -c '"$@" 2>&1; [ $? = 3 ]' sh "$build/assay" grade -q -o "$tmp/four" --before "$tmp/no" "$tmp/other.rubric" "$tmp/submissions"/*
+expect "grades that are not there" 3 "no: No such file or directory" "$build/assay" grade -q -o "$tmp/four" --before "$tmp/no" "$tmp/other.rubric" "$tmp/submissions"/*
 check "and nothing is graded" test ! -e "$tmp/four"
 check "what changed" grep -q '"was": 3.5' "$tmp/three/bob/grade.json"
 # A program whose Parts 1 and 2 are done and that still shows normals, as the starter code does; with other normals

@@ -103,12 +103,9 @@ bool grade_checks_rates(const struct grading *g, int set, const struct rubric_ch
     struct stopping by[NUM_STOPPING_KINDS];
     struct rate_image rates;
     struct err why; /* of the image: grade_checks_judge_rates() has reported it */
-    if (!judging_expect_noise(g, set, image, e))
-        return false;
     if (!rate_image_read(g->h->made[image].rates, p, c->batch, answer_key_counts(g->a, set, image),
                          &rates, &why) ||
-        !stopping_rule_samples(p, &g->h->image[image], answer_key_image(g->a, set, image), by,
-                               &why))
+        !judging_samples(g, set, image, by, &why))
         return !err_is_of_memory(&why) || err_set(e, "%s", why.msg);
     double least = by[STOPS_RIGHTLY].least, most = by[STOPS_RIGHTLY].most,
            odd = rates.odd / fmax(1, rates.pixels),

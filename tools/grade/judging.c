@@ -165,3 +165,11 @@ bool judging_expect_noise(const struct grading *g, int set, int image, struct er
     free(count);
     return known || !err_is_of_memory(&no_rates) || err_set(e, "%s", no_rates.msg);
 }
+
+bool judging_samples(const struct grading *g, int set, int image,
+                     struct stopping out[NUM_STOPPING_KINDS], struct err *e)
+{
+    return judging_expect_noise(g, set, image, e) &&
+           stopping_rule_samples(&g->r->image[image], &g->h->image[image],
+                                 answer_key_image(g->a, set, image), out, e);
+}

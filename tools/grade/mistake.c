@@ -34,7 +34,7 @@ static bool is_seen(const struct grading *g)
 }
 
 /* Each part that lost points by itself. Only a bug of that part's own code is believed: images that are
- * black, or wrong by a mistake of an earlier part, resemble many others. */
+ * wrong by a mistake of an earlier part resemble many others. */
 static bool diagnose_parts(const struct grading *g, int set, const double *share,
                            struct mistake *out, struct err *e)
 {

@@ -169,12 +169,9 @@ static bool expect_samples(const struct grading *g, int set, int image, struct s
     struct err why;
     if (isnan(clue->seen.fact[FACT_SAMPLES]))
         return true;
-    if (!judging_expect_noise(g, set, image, e))
-        return false;
     if (is_clipped(&g->h->image[image]))
         clue->seen.fact[FACT_SAMPLES] = NAN;
-    else if (!stopping_rule_samples(&g->r->image[image], &g->h->image[image],
-                                    answer_key_image(g->a, set, image), by, &why)) {
+    else if (!judging_samples(g, set, image, by, &why)) {
         clue->seen.fact[FACT_SAMPLES] = NAN;
         return !err_is_of_memory(&why) || err_set(e, "%s", why.msg);
     }

@@ -53,18 +53,16 @@ void grade_summary_bug(FILE *f, const json_t *grade)
         if (located[0] != '\0')
             html_print(f, "<p>It shows <b>%s</b>.</p>\n", located);
         fputs("</div>\n", f);
-    } else if (located[0] != '\0') {
-        html_print(
-            f,
-            "<div class=\"finding\"><p>No known mistake explains all of it. It shows <b>%s</b>.</p>\n",
-            located);
-        parts_by_themselves(f, diagnosis);
-        fputs("</div>\n", f);
-    } else if (strcmp(member_or_empty(diagnosis, "finding"), "unknown") == 0) {
-        fputs(
-            "<div class=\"finding\"><p>The images differ from the right ones in a way that no known mistake "
-            "explains.</p>\n",
-            f);
+    } else if (located[0] != '\0' ||
+               strcmp(member_or_empty(diagnosis, "finding"), "unknown") == 0) {
+        fputs("<div class=\"finding\">", f);
+        if (located[0] != '\0')
+            html_print(f, "<p>No known mistake explains all of it. It shows <b>%s</b>.</p>\n",
+                       located);
+        else
+            fputs(
+                "<p>The images differ from the right ones in a way that no known mistake explains.</p>\n",
+                f);
         parts_by_themselves(f, diagnosis);
         fputs("</div>\n", f);
     }
