@@ -1,6 +1,7 @@
 #include "exr_zip.h"
 
 #include <libdeflate.h>
+#include <stdbool.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
@@ -28,15 +29,20 @@ struct exr_zip *exr_zip_new(int width, int channels, const int *from, int rows)
         return NULL;
     z->width = (size_t)width;
     z->channels = (size_t)channels;
-    z->compressor = libdeflate_alloc_compressor(LEVEL);
-    z->decompressor = libdeflate_alloc_decompressor();
-    z->room = libdeflate_zlib_compress_bound(z->compressor, most);
-    z->from = malloc(z->channels * sizeof *z->from);
     z->raw = malloc(most);
     z->mixed = malloc(most);
-    z->packed = malloc(z->room);
-    if (z->compressor == NULL || z->decompressor == NULL || z->from == NULL || z->raw == NULL ||
-        z->mixed == NULL || z->packed == NULL) {
+    bool ok = z->raw != NULL && z->mixed != NULL;
+    if (from == NULL) {
+        z->decompressor = libdeflate_alloc_decompressor();
+        ok = ok && z->decompressor != NULL;
+    } else { /* a megabyte, which a reader of many small files would spend its time on */
+        z->compressor = libdeflate_alloc_compressor(LEVEL);
+        z->room = libdeflate_zlib_compress_bound(z->compressor, most);
+        z->packed = malloc(z->room);
+        z->from = malloc(z->channels * sizeof *z->from);
+        ok = ok && z->compressor != NULL && z->packed != NULL && z->from != NULL;
+    }
+    if (!ok) {
         exr_zip_free(z);
         return NULL;
     }

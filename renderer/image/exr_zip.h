@@ -7,8 +7,8 @@
 
 struct exr_zip;
 
-/* For chunks of up to `rows` rows of float32. from[k]: which channel of the image is the k-th of the file (copied; NULL
- * for reading only). Returns NULL if out of memory; exr_zip_free() the result. */
+/* For chunks of up to `rows` rows of float32: to pack them, where from[k] is which channel of the image is the k-th of
+ * the file (copied), or to unpack them, where `from` is NULL. Returns NULL if out of memory; exr_zip_free() the result. */
 struct exr_zip *exr_zip_new(int width, int channels, const int *from, int rows);
 void exr_zip_free(struct exr_zip *z);
 

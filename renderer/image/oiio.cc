@@ -123,10 +123,21 @@ const char *channel_of(const struct library_image *p, int c)
 bool read_image(struct library_image *p, float *data, char *why, size_t size)
 {
     return guarded(why, size, [&]() -> std::string {
-        if (p->in->spec().deep)
+        const OIIO::ImageSpec &spec = p->in->spec();
+        if (spec.deep)
             return "has deep pixels";
-        if (!p->in->read_image(0, 0, 0, p->in->spec().nchannels, OIIO::TypeDesc::FLOAT, data))
+        // As stored, if all channels are stored alike: to convert, the library takes 16 MB for the smallest image.
+        const bool alike = spec.channelformats.empty();
+        const bool convert = alike && spec.format != OIIO::TypeDesc::FLOAT;
+        std::vector<char> stored(convert ? spec.image_bytes(true) : 0);
+        if (!p->in->read_image(0, 0, 0, spec.nchannels,
+                               alike ? OIIO::TypeDesc::UNKNOWN : OIIO::TypeDesc::FLOAT,
+                               convert ? static_cast<void *>(stored.data()) : data))
             return "cannot read: " + p->in->geterror();
+        const size_t row = size_t(spec.width) * size_t(spec.nchannels);
+        for (size_t y = 0; convert && y < size_t(spec.height); y++)
+            OIIO::convert_pixel_values(spec.format, &stored[y * row * spec.format.size()],
+                                       OIIO::TypeDesc::FLOAT, data + y * row, int(row));
         return "";
     });
 }
