@@ -9,6 +9,8 @@ passed=0 failed=0 skipped=0
 log=$build/check
 rm -rf "$log"
 mkdir -p "$log"
+# Debian's python3, for which the tests' packages are, whatever another one is first.
+export PATH=/usr/bin:$PATH
 # Blender's own scripts take half a second to compile at each start, where nothing may be written beside them.
 export PYTHONPYCACHEPREFIX=$(realpath "$log")/python PYTHONDONTWRITEBYTECODE=
 
@@ -24,8 +26,8 @@ run_job() {
 }
 export -f run_job
 
-# The tests that are scripts, with the long programs among them, then the short ones: one job more than there are processors, since some
-# wait for other programs.
+# The tests that are scripts, with the long programs among them, then the short ones: two jobs more than there are processors, since
+# some wait, for POV-Ray's threads to start or for a sandbox's time to run out.
 scripts() { sed "s#PLAIN#${PLAIN_BUILD:-$build}#; s#BUILD#$build#; /^\#/d" tests/scripts.txt; }
 programs() { for p in "${programs[@]}"; do echo "$(basename "$p") $p"; done; }
 long='/test_(approve|calibration|cycles.*|embree|materials|povray.*|statistics|suite_scenes)$'
@@ -34,7 +36,7 @@ long='/test_(approve|calibration|cycles.*|embree|materials|povray.*|statistics|s
     programs | grep -E "$long"
     scripts | tail -n +3
     programs | grep -vE "$long"
-} | xargs -L 1 -P "$(($(nproc) + 1))" bash -c 'run_job "$0" "$@"' "$log"
+} | xargs -L 1 -P "$(($(nproc) + 2))" bash -c 'run_job "$0" "$@"' "$log"
 
 # Lines "ok ...", "not ok ..." and "skip ..."; of a test program cmocka's own: "[       OK ] name", "[  FAILED  ] name", "[  SKIPPED ] name",
 # which come twice where a test fails: only the first list is counted.
