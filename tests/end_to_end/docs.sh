@@ -17,12 +17,13 @@ fragments() {
 }
 # Prints a line for each dead link of the files given. Links in code do not count.
 dead_links() {
-    local page link file
+    local page dir link file
     for page in "$@"; do
+        dir=$(dirname "$page")
         awk '/^```/ { code = !code } !code && !/^    /' "$page" | sed 's/`[^`]*`//g' | grep -oE '\]\([^) ]+(\)|$)' |
             sed 's/^](//; /)$/!s/$/: not closed/; s/)$//' | grep -vE '^[a-z]+:' | while read -r link; do
             file=${link%%#*}
-            if [ -z "$file" ]; then file=$page; else file=$(dirname "$page")/$file; fi
+            if [ -z "$file" ]; then file=$page; else file=$dir/$file; fi
             if [ ! -e "$file" ]; then
                 echo "$page: $link"
             elif [[ $link == *#* ]] && ! fragments "$file" | grep -qxF -- "${link#*#}"; then
@@ -42,12 +43,13 @@ tell "control: three dead links are seen" "$(dead_links "$tmp/docs/one.md" | sed
     diff - <(printf 'docs/one.md: gone.md\ndocs/one.md: ../two.md#gone: no such heading\ndocs/one.md: two.md: not closed\n'))"
 
 # Prints sources named in code of pages, by name or by path, that do not exist. A name with NAME in it stands for any.
-git ls-files -co --exclude-standard | sed 's,.*/,,' | sort -u >"$tmp/names"
+declare -A exists
+while read -r name; do exists[$name]=1; done < <(git ls-files -co --exclude-standard | sed 's,.*/,,' | sort -u)
 missing_names() {
     grep -oE '`[A-Za-z0-9_/]+\.(c|h|cc|sh|mjs|js)`' "$@" /dev/null | tr -d '`' | grep -v NAME | while IFS=: read -r page name; do
         case $name in
         */*) [ -e "$name" ] || [ -e "$(dirname "$page")/$name" ] || echo "$page: $name" ;;
-        *) grep -qxF "$name" "$tmp/names" || echo "$page: $name" ;;
+        *) [ -n "${exists[$name]:-}" ] || echo "$page: $name" ;;
         esac
     done
 }

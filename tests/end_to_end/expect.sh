@@ -9,11 +9,12 @@ tell() { # NAME WHY: not ok where WHY says something
     fi
 }
 expect() { # NAME STATUS PATTERN COMMAND...: a status of 3 comes with one line on stderr
-    local name=$1 status=$2 pattern=$3 why=""
+    local name=$1 status=$2 pattern=$3 why="" lines=()
     shift 3
     "$@" >"$tmp/out" 2>"$tmp/err" </dev/null
     local got=$?
-    [ $got -eq "$status" ] && cat "$tmp/out" "$tmp/err" | grep -q -- "$pattern" && { [ "$status" -ne 3 ] || [ "$(wc -l <"$tmp/err")" -eq 1 ]; } ||
+    [ "$status" -ne 3 ] || mapfile -t lines <"$tmp/err"
+    [ $got -eq "$status" ] && grep -qh -- "$pattern" "$tmp/out" "$tmp/err" && { [ "$status" -ne 3 ] || [ ${#lines[@]} -eq 1 ]; } ||
         why="status $got, no '$pattern' or more than a line: $(head -c 1000 "$tmp/out" "$tmp/err")"
     tell "$name" "$why"
 }
