@@ -170,7 +170,7 @@ END
 printf '#!/bin/sh\ncd "%s" && for task in *; do [ ! -e "$task" ] || echo "$task $(cat "$task")"; done\n' "$tmp/queue" >"$tmp/slurm/squeue"
 printf '#!/bin/sh\nrm -f "%s/$2 "*\n' "$tmp/queue" >"$tmp/slurm/scancel"
 chmod +x "$tmp/slurm"/* "$tmp/run"
-slurm() { (PATH=$tmp/slurm:$PATH exec timeout --foreground 60 "$assay" slurm "$@"); }
+slurm() { (PATH=$tmp/slurm:$PATH exec timeout --foreground 300 "$assay" slurm "$@"); }
 said() { "$@" 2>"$tmp/said" || { local status=$?; tail -n 1 "$tmp/said" >&2; return $status; }; } # its last line alone
 render=(pathtracer -q -t 1 -r 32 32 -s 16)
 "$pathtracer" "${render[@]:1}" -f "$tmp/here.exr" -f "$tmp/here.png" "$scene" >"$tmp/out"
