@@ -188,13 +188,15 @@ TEST(a_hang_ends_with_all_its_processes)
     must_do(fs_path("sleep 0.5; ! grep -qs [9]8765.%d /proc/[0-9]*/cmdline", getpid()));
 }
 
+/* The kernel looks at its clock ticks, which a busy host may withhold from a virtual machine for a second or two, and
+ * the time of the sandbox's own start is counted too: 2.5 s have been seen. Without the limit it is 60 s. */
 TEST(a_busy_loop_ends_by_processor_time)
 {
     struct sandbox_limits limit = small;
     limit.cpu_s = 1;
     struct sandbox_result r = run_with("while :; do :; done", limit, NULL);
     assert_int_equal(r.end, SANDBOX_CPU);
-    assert_true(r.cpu_s >= 0.8 && r.cpu_s < 2.5);
+    assert_true(r.cpu_s >= 0.8 && r.cpu_s < 10);
     assert_int_equal(run_with("trap '' XCPU; while :; do :; done", limit, NULL).end, SANDBOX_CPU);
 }
 
