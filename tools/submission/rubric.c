@@ -116,7 +116,7 @@ static void read_limit(struct statement *s)
     int k;
     if (!cli_choice("limit", take_word(s), kinds, &k, &why)) {
         rubric_mistake(s->m, s->line, "%s", why.msg);
-        s->rest += strlen(s->rest); /* the value of an unknown limit is no second mistake */
+        s->rest += strlen(s->rest); /* its value is no second mistake */
         return;
     }
     snprintf(word, sizeof word, "limit %s", kinds[k]);
@@ -156,10 +156,12 @@ static void read_build(struct statement *s)
 
 static void read_budget(struct statement *s)
 {
-    if (strcmp(take_word(s), "cpu") == 0)
+    if (strcmp(take_word(s), "cpu") == 0) {
         take_number(s, "budget cpu", 0, 1e6, &s->r->budget_s);
-    else
+    } else {
         rubric_mistake(s->m, s->line, "'budget' is of cpu");
+        s->rest += strlen(s->rest); /* its value is no second mistake */
+    }
 }
 
 static void read_mask(struct statement *s)
