@@ -33,7 +33,8 @@ undo() { find "$1" -name '*.kept' | while read -r kept; do mv "$kept" "${kept%.k
 # tree SUBMISSION: a copy of it, mended and built
 tree() {
     local tree=$out/trees/$1
-    [ -e "$tree/mended" ] && { undo "$tree"; return 0; }
+    # Not a copy of another OUT: it would be built there.
+    [ -e "$tree/mended" ] && grep -qx "CMAKE_HOME_DIRECTORY:INTERNAL=$tree" "$tree/build/CMakeCache.txt" && { undo "$tree"; return 0; }
     rm -rf "$tree" && mkdir -p "$tree/build" && tar -C "$peers/$1" --exclude=./build -cf - . | tar -C "$tree" -xf - && apply "$tree" "$1" || return 1
     find "$tree" -name '*.kept' -delete
     if ! (cd "$tree/build" && cmake -DCMAKE_BUILD_TYPE=Release -DCMAKE_C_COMPILER_LAUNCHER=ccache -DCMAKE_CXX_COMPILER_LAUNCHER=ccache "-DCMAKE_BUILD_RPATH=\$ORIGIN" .. && make) \
