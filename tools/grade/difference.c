@@ -28,6 +28,7 @@ double interval_half(const struct interval *i)
 struct pair {
     const struct submitted_image *a, *b;
     const unsigned char *use;
+    const double *share; /* of each value in kappa; NULL: what its own noise and rounding say */
 };
 
 /* Weighted least squares of r^2 - c = kappa m with w = 1/(m + c)^2: sums of u = w m (r^2 - c) and v
@@ -58,13 +59,23 @@ static bool all_used(const struct pair *p, int x, int y)
 }
 
 /* A difference r with E[r^2] = kappa m + known + rounding. */
-static void add_square(double r, double m, double known, double rounding, struct slope *s)
+struct square {
+    double r, m, known, rounding;
+};
+
+/* w m^2. 0 where rounding is larger than the noise, and r^2 says nothing of it: a flat area is rounded alike
+ * everywhere. */
+static double share_of(const struct square *q)
 {
-    /* Where rounding is the larger, r^2 says nothing of noise: a flat area is rounded alike everywhere. */
-    if (m <= rounding)
+    const double ratio = q->m / (q->m + q->known + q->rounding);
+    return q->m > q->rounding ? ratio * ratio : 0;
+}
+
+static void add_square(const struct square *q, double share, struct slope *s)
+{
+    if (share == 0)
         return;
-    double c = known + rounding, weight = m / ((m + c) * (m + c));
-    double u = weight * (r * r - c), v = weight * m;
+    double weight = share / q->m, u = weight * (q->r * q->r - q->known - q->rounding), v = share;
     s->num++;
     s->u += u;
     s->v += v;
@@ -96,24 +107,41 @@ static struct second second_difference(const struct submitted_image *of, int x, 
     return s;
 }
 
-static void add_place(const struct pair *p, int x, int y, size_t c, struct slope *s)
+static struct square square_at(const struct pair *p, int x, int y, size_t c)
 {
     struct second a = second_difference(p->a, x, y, c), b = second_difference(p->b, x, y, c);
     double known = p->b->known ? b.variance : 0;
-    add_square(a.value - b.value, a.variance + b.variance - known, known, a.rounding + b.rounding,
-               s);
+    return (struct square){a.value - b.value, a.variance + b.variance - known, known,
+                           a.rounding + b.rounding};
 }
 
-/* Adds the differences of successive runs of A at one pixel; errors that both have cancel. */
+/* Of runs k and k + 1 of A; errors that both have cancel. */
+static struct square square_of_runs(const struct pair *p, int k, size_t i)
+{
+    const struct submitted_image *one = &p->a->run[k], *next = one + 1;
+    return (struct square){one->mean[i] - next->mean[i], one->variance[i] + next->variance[i], 0,
+                           one->rounding[i] + next->rounding[i]};
+}
+
+static size_t value_at(const struct pair *p, int x, int y, size_t c)
+{
+    return 3 * ((size_t)y * (size_t)p->a->width + (size_t)x) + c;
+}
+
+static void add_place(const struct pair *p, int x, int y, size_t c, struct slope *s)
+{
+    const struct square q = square_at(p, x, y, c);
+    add_square(&q, p->share != NULL ? p->share[value_at(p, x, y, c)] : share_of(&q), s);
+}
+
 static void add_runs(const struct pair *p, int x, int y, size_t c, struct slope *s)
 {
-    size_t i = 3 * ((size_t)y * (size_t)p->a->width + (size_t)x) + c;
-    for (int k = 0; k + 1 < p->a->num_runs; k++) {
-        const struct submitted_image *one = &p->a->run[k], *next = one + 1;
-        if (!one->clipped[i] && !next->clipped[i])
-            add_square(one->mean[i] - next->mean[i], one->variance[i] + next->variance[i], 0,
-                       one->rounding[i] + next->rounding[i], s);
-    }
+    const size_t i = value_at(p, x, y, c);
+    for (int k = 0; k + 1 < p->a->num_runs; k++)
+        if (!p->a->run[k].clipped[i] && !p->a->run[k + 1].clipped[i]) {
+            const struct square q = square_of_runs(p, k, i);
+            add_square(&q, p->share != NULL ? p->share[i] : share_of(&q), s);
+        }
 }
 
 static void add_slope(struct slope *to, const struct slope *s)
@@ -338,7 +366,7 @@ bool difference_measure(const struct submitted_image *a, const struct submitted_
                         const unsigned char *use, double alpha, struct difference *out,
                         struct err *e)
 {
-    const struct pair p = {a, b, use};
+    const struct pair p = {a, b, use, NULL};
     const struct rect whole = {0, 0, a->width, a->height};
     int columns = a->width / RUBRIC_TILE, rows = a->height / RUBRIC_TILE;
     double pixels = (double)a->width * a->height, furthest = -1;
@@ -387,14 +415,14 @@ void difference_free(struct difference *a)
 double difference_kappa(const struct submitted_image *a, const struct submitted_image *reference,
                         const unsigned char *use)
 {
-    const struct pair p = {a, reference, use};
+    const struct pair p = {a, reference, use, NULL};
     return noise_in_image(&p).kappa;
 }
 
 bool difference_kappas(const struct submitted_image *a, const struct submitted_image *reference,
                        const unsigned char *use, double *kappa, double *sd, struct err *e)
 {
-    const struct pair p = {a, reference, use};
+    const struct pair p = {a, reference, use, NULL};
     int tiles = a->width / RUBRIC_TILE * (a->height / RUBRIC_TILE);
     struct noise whole, *local;
     if (!noises_of(&p, &whole, &local, e))
@@ -410,7 +438,7 @@ bool difference_correlated(const struct submitted_image *a, const struct submitt
                            const struct submitted_image *reference, const unsigned char *use)
 {
     static const double certain = 6; /* standard deviations */
-    const struct pair p = {a, reference, use};
+    const struct pair p = {a, reference, use, NULL};
     double num = 0, ab = 0, aa = 0, bb = 0;
     for (int y = 0; y < a->height; y++)
         for (int x = 0; x < a->width; x++)
@@ -445,12 +473,40 @@ bool difference_related(const struct submitted_image *s, const struct submitted_
     return n > 0 && ab - a * b / n > 5 * sqrt((aa - a * a / n) * (bb - b * b / n) / n);
 }
 
+/* Multiplies share[] by the shares that the values of a pair would have by themselves. */
+static void take_shares(const struct pair *p, double *share)
+{
+    for (int y = 0; y < p->a->height; y++)
+        for (int x = 0; x < p->a->width; x++)
+            for (size_t c = 0; c < 3; c++) {
+                const size_t i = value_at(p, x, y, c);
+                struct square q = {0};
+                if (has_runs(p) && p->use[i / 3])
+                    q = square_of_runs(p, 0, i);
+                else if (!has_runs(p) && all_used(p, x, y))
+                    q = square_at(p, x, y, c);
+                share[i] *= q.m > 0 ? share_of(&q) : 0;
+            }
+}
+
 bool difference_noise(const struct submitted_image *p, const struct submitted_image *reference_p,
                       const struct submitted_image *q, const struct submitted_image *reference_q,
                       const unsigned char *use, double alpha, struct interval *out, struct err *e)
 {
-    const struct pair a = {p, reference_p, use}, b = {q, reference_q, use};
+    const size_t values = 3 * (size_t)p->width * (size_t)p->height;
+    double *share = malloc(values * sizeof *share);
+    if (share == NULL)
+        return err_set(e, "out of memory");
+    for (size_t i = 0; i < values; i++)
+        share[i] = 1;
+    /* The same for both: another method's noise is not ours times one factor, and of the image with fewer samples more
+     * pixels have noise above rounding. */
+    struct pair a = {p, reference_p, use, NULL}, b = {q, reference_q, use, NULL};
+    take_shares(&a, share);
+    take_shares(&b, share);
+    a.share = b.share = share;
     struct noise na = noise_in_image(&a), nb = noise_in_image(&b);
+    free(share);
     if (!na.known || !nb.known)
         return err_set(e, "there is no noise in one of the images");
     /* Var ln v = 2/dof. */

@@ -337,6 +337,8 @@ static bool check_noise(struct judging *w, struct result *out, struct err *e)
         out->more = 0; /* clipped pixels are left out of it */
         judge(w, &w->check->log_ratio, &i, 0, out);
         settle(w, false, out);
+    } else if (err_is_of_memory(&why)) {
+        return err_set(e, "%s", why.msg);
     } else {
         snprintf(out->seen, sizeof out->seen, "%.390s", why.msg);
     }

@@ -566,6 +566,28 @@ TEST(noise_falls_or_not)
     expect_share(check(CHECK_NOISE, 2, two, (const double[]){SPP / 4, SPP / 4}, asked, 1e-5), 0, 0);
 }
 
+/* The same of a program by another method than ours, which has a 400th of its variance in the left half: there our noise, but not
+ * the program's, is below the codes' rounding in the second image alone. */
+TEST(noise_of_another_method_falls_or_not)
+{
+    static const int asked[] = {SPP / 4, 4 * SPP};
+    OWN(moments) ours;
+    make_reference(&ours);
+    for (size_t i = 0; i < 3 * PIXELS; i++)
+        ours.m2[i] /= i / 3 % WIDTH < WIDTH / 2 ? 400 : 1;
+    for (int falls = 0; falls < 2; falls++) {
+        struct task *t = start(CHECK_NOISE, 2, 1e-5);
+        t->r.check[0].log_ratio = (struct margin){0.5, 1.5, true}; /* of a factor of 16 */
+        for (int k = 0; k < 2; k++) {
+            t->a.of[0][k].m = t->a.of[0][k].noise = ours;
+            t->r.image[k].spp = asked[k];
+            t->h.image[k] = submit_render(&none, falls ? asked[k] : asked[0]);
+        }
+        OWN(result) r = run_check(t);
+        expect_share(r, falls, falls);
+    }
+}
+
 TEST(pixels_are_exact_or_not)
 {
     const struct bug *right = &none;
