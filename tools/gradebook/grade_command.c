@@ -14,6 +14,7 @@
 #include "grade_needs.h"
 #include "same_noise.h"
 
+#include <dirent.h>
 #include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -128,6 +129,31 @@ static void warn_of_strangers(const char *file, const struct appeals *a, const j
     }
 }
 
+/* Says which submissions have been graded into that directory before and are not in its list now: a class of which one
+ * was graded again would look as if it had one member. */
+static void warn_of_others(const char *out, const json_t *grades)
+{
+    char first[256] = "";
+    int num = 0;
+    DIR *d = opendir(out);
+    for (const struct dirent *in; d != NULL && (in = readdir(d)) != NULL;) {
+        bool listed = in->d_name[0] == '.' ||
+                      access(fs_path("%s/%s/grade.json", out, in->d_name).s, R_OK) != 0;
+        json_each(g, grades)
+            listed = listed || strcmp(member_or_empty(g, "id"), in->d_name) == 0;
+        if (!listed && (num++ == 0 || strcmp(in->d_name, first) < 0))
+            snprintf(first, sizeof first, "%s", in->d_name);
+    }
+    if (d != NULL)
+        closedir(d);
+    if (num > 0)
+        fprintf(
+            stderr,
+            "%s: its pages and grades.csv now list %zu; %d graded before, '%s' first, are not among them: name "
+            "them too, they are not run again, or give another -o\n",
+            out, json_array_size(grades), num, first);
+}
+
 static int run_batch(const struct grade_settings *s, const struct rubric *r,
                      const struct answer_key *answers, const char *const *word,
                      const struct sandbox *box, struct err *e)
@@ -160,6 +186,7 @@ static int run_batch(const struct grade_settings *s, const struct rubric *r,
     if (ok)
         warn_of_strangers(s->appeals, &appeals, grades);
     if (ok && grade_write(s->out, r, answers, grades, e)) {
+        warn_of_others(s->out, grades);
         size_t need = need_staff(grades), lost = in_trouble(grades, e);
         code = need > 0 ? EXIT_INCONCLUSIVE : EXIT_EQUIVALENT;
         if (lost > 0) {
