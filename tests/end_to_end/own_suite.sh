@@ -51,6 +51,8 @@ again=$(python3 -c "import json; print(json.load(open('report/results.json'))['c
 expect "the command of a claim runs as it is printed" 0 "result: all as it should be" bash -c "$again"
 expect "outside a suite ours are looked for where they are installed" 3 "no scene 'x' in .*/share/assay/scenes" assay validate --only x
 
+expect "an engine that reads scenes of its own is not given ours" 3 'mine.json is for a suite of its own.*: give --suite DIR' assay validate -q --engine begun/mine.json
+
 # References of any kind: another engine's name, ours, a closed form that a program writes, one that must come out different.
 cp -r begun many
 sed -i 's/"replicates": 64/"replicates": 16/' many/mine.json
