@@ -145,7 +145,7 @@ right "and no lock stays" test ! -e "$tmp/taken/.assay-lock"
 
 # Jobs on a cluster, by stand-ins for Slurm's programs that run an array here, a task after the other. Of the first array task 2 is
 # lost like a plug that is pulled; a real cluster: make slurm.
-mkdir "$tmp/slurm" "$tmp/queue"
+mkdir "$tmp/slurm" "$tmp/queue" "$tmp/began"
 cat >"$tmp/slurm/sbatch" <<END
 #!/bin/bash
 for word; do
@@ -157,10 +157,14 @@ for word; do
 done
 for ((k = 1; k <= tasks; k++)); do echo PENDING >"$tmp/queue/\$name \$k"; done
 [ -z "\${CHANGE:-}" ] || echo >>"\$CHANGE"
-[ -n "\${HOLD:-}" ] || setsid "$tmp/run" "\$name" \$tasks "\$output" "\${@: -1}" </dev/null >/dev/null 2>&1 &
+[ -z "\${HOLD:-}" ] || exit 0
+setsid "$tmp/run" "\$name" \$tasks "\$output" "\${@: -1}" </dev/null >/dev/null 2>&1 &
+# Before it has a session of its own it would be killed with this script's group.
+until [ -e "$tmp/began/\$name" ]; do sleep 0.01; done
 END
 cat >"$tmp/run" <<END
 #!/bin/bash
+: >"$tmp/began/\$1"
 for ((k = 1; k <= \$2; k++)); do
     echo RUNNING >"$tmp/queue/\$1 \$k"
     [[ \$1 = *-1 && \$k = "\${LOST:-}" ]] || SLURM_ARRAY_TASK_ID=\$k sh -c "\$4" >"\${3/\%a/\$k}" 2>&1
@@ -170,7 +174,7 @@ END
 printf '#!/bin/sh\ncd "%s" && for task in *; do [ ! -e "$task" ] || echo "$task $(cat "$task")"; done\n' "$tmp/queue" >"$tmp/slurm/squeue"
 printf '#!/bin/sh\nrm -f "%s/$2 "*\n' "$tmp/queue" >"$tmp/slurm/scancel"
 chmod +x "$tmp/slurm"/* "$tmp/run"
-slurm() { (PATH=$tmp/slurm:$PATH exec timeout --foreground 300 "$assay" slurm "$@"); }
+slurm() { (PATH=$tmp/slurm:$PATH exec timeout --foreground 60 "$assay" slurm "$@"); }
 said() { "$@" 2>"$tmp/said" || { local status=$?; tail -n 1 "$tmp/said" >&2; return $status; }; } # its last line alone
 render=(pathtracer -q -t 1 -r 32 32 -s 16)
 "$pathtracer" "${render[@]:1}" -f "$tmp/here.exr" -f "$tmp/here.png" "$scene" >"$tmp/out"
