@@ -44,14 +44,15 @@ void grade_checks_tell(const struct difference *a, char *text, size_t size)
                     a->tile_y, 100 * a->tile.value, 100 * a->tile.lo, 100 * a->tile.hi);
 }
 
-/* Takes one more interval into account: the smallest share counts. */
-static void judge(const struct judging *w, const struct margin *m, const struct interval *i,
+/* Takes one more interval into account: the smallest share counts. Does it cost points by its width alone? */
+static bool judge(const struct judging *w, const struct margin *m, const struct interval *i,
                   double blur, struct result *out)
 {
     double share = score_share(m, i), chance = score_chance(m, i), width = score_width(m, i);
+    const bool wide = !judging_can_buy(w) && width < share;
     if (judging_can_buy(w)) {
         out->more = fmax(out->more, score_more(m, i, blur));
-    } else if (width < share) {
+    } else if (wide) {
         share = width;
         chance = width > 0;
     }
@@ -60,6 +61,14 @@ static void judge(const struct judging *w, const struct margin *m, const struct 
     else if (share == 1 && out->share == 1)
         out->chance = fmin(1, out->chance + chance);
     out->share = fmin(out->share, share);
+    return wide;
+}
+
+static void tell_if_wide(bool wide, struct result *out)
+{
+    if (wide)
+        text_append(out->seen, sizeof out->seen,
+                    "; too noisy: an interval is longer than the margins, which costs points too");
 }
 
 /* A check that has lost all its points is decided. A check whose images cannot be compared yet
@@ -75,6 +84,7 @@ static void settle(const struct judging *w, bool blind, struct result *out)
 static void score_agreement(const struct judging *w, struct result *out)
 {
     const struct rubric_check *c = w->check;
+    bool wide = false;
     out->share = 1;
     out->chance = 0;
     for (int k = 0; k <= NUM_CHANNELS; k++) {
@@ -83,9 +93,10 @@ static void score_agreement(const struct judging *w, struct result *out)
         const struct margin *m = k < NUM_CHANNELS ? &c->image : &c->tile;
         if (k == NUM_CHANNELS && out->agreement.tiles == 0)
             continue;
-        judge(w, m, i, out->agreement.blur[k], out);
+        wide = judge(w, m, i, out->agreement.blur[k], out) || wide;
     }
     grade_checks_tell(&out->agreement, out->seen, sizeof out->seen);
+    tell_if_wide(wide, out);
 }
 
 static bool is_brighter(const struct rubric_check *c, const struct difference *a)
@@ -335,7 +346,7 @@ static bool check_noise(struct judging *w, struct result *out, struct err *e)
                  exp(i.lo), exp(i.hi));
         out->share = 1;
         out->more = 0; /* clipped pixels are left out of it */
-        judge(w, &w->check->log_ratio, &i, 0, out);
+        tell_if_wide(judge(w, &w->check->log_ratio, &i, 0, out), out);
         settle(w, false, out);
     } else if (err_is_of_memory(&why)) {
         return err_set(e, "%s", why.msg);

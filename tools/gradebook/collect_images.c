@@ -54,7 +54,12 @@ static bool make_image(const struct collect *c, const struct rubric_image *p, st
     else if (err_is_of_memory(&wrong) || !can_open_more()) /* which is our trouble */
         return err_set(e, "%s: %s", p->name, wrong.msg);
     image->spp = p->spp;
-    snprintf(why, 400, "%.390s", wrong.msg);
+    /* Students know neither where staff keep it nor how it is called there. */
+    const size_t place = strlen(made->path);
+    const bool is_ours = place > 0 && strncmp(wrong.msg, made->path, place) == 0;
+    const char *theirs =
+        c->submission->kind == SUBMISSION_IMAGES ? fs_base(made->path) : job->rubric->output;
+    snprintf(why, 400, "%.64s%.330s", is_ours ? theirs : "", wrong.msg + (is_ours ? place : 0));
     return true;
 }
 

@@ -90,6 +90,7 @@ void grade_plot_intervals(FILE *f, const json_t *check)
         draw_interval(&p, json_array_get(list, i), (double)(num - 1 - i));
     plot_close(&p);
     fputs("<figcaption>by how much, with the noise of the image: all points while a bar touches "
-          "green, none once it has left yellow</figcaption></figure>\n",
+          "green, none once it has left yellow; fewer if it is longer than the yellow field, as "
+          "the image is then too noisy to tell</figcaption></figure>\n",
           f);
 }

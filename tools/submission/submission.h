@@ -89,8 +89,8 @@ bool submission_will_hang(const struct rubric *r, const struct made *made, int i
  * text. */
 bool submission_printed_usage(const char *log, char *why, size_t size);
 
-/* After all images: if none could be read, says so once, in s->state and s->why. why: of each image; if all
- * have the same reason, each then refers to s->why. */
+/* After all images: if none could be read, says so once, in s->why, and in s->state if none was made. why: of each
+ * image; if all have the same reason, those that were not made then refer to s->why. */
 void submission_conclude(const struct rubric *r, const struct made *made, char (*why)[400],
                          struct submission *s);
 

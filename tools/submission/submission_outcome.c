@@ -79,21 +79,23 @@ bool submission_printed_usage(const char *log, char *why, size_t size)
 void submission_conclude(const struct rubric *r, const struct made *made, char (*why)[400],
                          struct submission *s)
 {
-    bool usage = true, same = true;
+    bool usage = true, same = true, any = s->kind == SUBMISSION_IMAGES;
     for (int i = 0; i < r->num_images; i++) {
         if (why[i][0] == '\0' || s->state != SUBMISSION_GRADED)
             return;
+        any = any || made[i].path[0] != '\0';
         usage = usage && made[i].usage;
         same = same && strcmp(why[i], why[0]) == 0;
     }
-    if (s->kind != SUBMISSION_IMAGES)
+    if (!any)
         s->state = usage ? SUBMISSION_USAGE : SUBMISSION_NOT_STARTED;
-    const char *what = s->kind == SUBMISSION_IMAGES ? "None of its images can be read"
-                       : usage                      ? "It prints its usage text for every image"
-                                                    : "No run of it made an image";
+    const char *what = any     ? "None of its images can be judged"
+                       : usage ? "It prints its usage text for every image"
+                               : "No run of it made an image";
     const char *text = usage ? strchr(why[0], ':') + 2 : why[0];
     snprintf(s->why, sizeof s->why, "%s: %s%s%s%.400s", what, same ? "" : "'",
              same ? "" : r->image[0].name, same ? "" : "': ", text);
     for (int i = 0; same && i < r->num_images; i++)
-        snprintf(why[i], sizeof why[i], "%s", submission_not_made);
+        if (made[i].path[0] == '\0')
+            snprintf(why[i], sizeof why[i], "%s", submission_not_made);
 }
