@@ -71,8 +71,10 @@ static double share_of(const struct square *q)
     return q->m > q->rounding ? ratio * ratio : 0;
 }
 
-static void add_square(const struct square *q, double share, struct slope *s)
+/* i: of which value. */
+static void add_square(const struct pair *p, size_t i, const struct square *q, struct slope *s)
 {
+    const double share = p->share != NULL ? p->share[i] : share_of(q);
     if (share == 0)
         return;
     double weight = share / q->m, u = weight * (q->r * q->r - q->known - q->rounding), v = share;
@@ -131,7 +133,7 @@ static size_t value_at(const struct pair *p, int x, int y, size_t c)
 static void add_place(const struct pair *p, int x, int y, size_t c, struct slope *s)
 {
     const struct square q = square_at(p, x, y, c);
-    add_square(&q, p->share != NULL ? p->share[value_at(p, x, y, c)] : share_of(&q), s);
+    add_square(p, value_at(p, x, y, c), &q, s);
 }
 
 static void add_runs(const struct pair *p, int x, int y, size_t c, struct slope *s)
@@ -140,7 +142,7 @@ static void add_runs(const struct pair *p, int x, int y, size_t c, struct slope 
     for (int k = 0; k + 1 < p->a->num_runs; k++)
         if (!p->a->run[k].clipped[i] && !p->a->run[k + 1].clipped[i]) {
             const struct square q = square_of_runs(p, k, i);
-            add_square(&q, p->share != NULL ? p->share[i] : share_of(&q), s);
+            add_square(p, i, &q, s);
         }
 }
 
