@@ -44,7 +44,7 @@ tell "control: three dead links are seen" "$(dead_links "$tmp/docs/one.md" | sed
 
 # Prints sources named in code of pages, by name or by path, that do not exist. A name with NAME in it stands for any.
 declare -A exists
-while read -r name; do exists[$name]=1; done < <(git ls-files -co --exclude-standard | sed 's,.*/,,' | sort -u)
+while read -r name; do exists[$name]=1; done < <(git ls-files -co --exclude-standard | sed 's,.*/,,')
 missing_names() {
     grep -oE '`[A-Za-z0-9_/]+\.(c|h|cc|sh|mjs|js)`' "$@" /dev/null | tr -d '`' | grep -v NAME | while IFS=: read -r page name; do
         case $name in

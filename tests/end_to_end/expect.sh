@@ -13,8 +13,8 @@ expect() { # NAME STATUS PATTERN COMMAND...: a status of 3 comes with one line o
     shift 3
     "$@" >"$tmp/out" 2>"$tmp/err" </dev/null
     local got=$?
-    [ "$status" -ne 3 ] || mapfile -t lines <"$tmp/err"
-    [ $got -eq "$status" ] && grep -qh -- "$pattern" "$tmp/out" "$tmp/err" && { [ "$status" -ne 3 ] || [ ${#lines[@]} -eq 1 ]; } ||
+    [ "$status" -ne 3 ] || mapfile lines <"$tmp/err"
+    [ $got -eq "$status" ] && grep -q -- "$pattern" "$tmp/out" "$tmp/err" && { [ "$status" -ne 3 ] || [[ ${#lines[@]} -eq 1 && ${lines[0]} == *$'\n' ]]; } ||
         why="status $got, no '$pattern' or more than a line: $(head -c 1000 "$tmp/out" "$tmp/err")"
     tell "$name" "$why"
 }

@@ -105,6 +105,7 @@ check "of the same runs" test "$(times "$tmp/three")" = "$before"
 expect "grades that are not there" 3 "no: No such file or directory" "$build/assay" grade -q -o "$tmp/four" --before "$tmp/no" "$tmp/other.rubric" "$tmp/submissions"/*
 check "and nothing is graded" test ! -e "$tmp/four"
 check "what changed" grep -q '"was": 3.5' "$tmp/three/bob/grade.json"
+expect "one graded alone: the others are said to be left out of the list" 0 "now list 1; $(($(ls "$tmp/submissions" | wc -l) - 1)) graded before, .* are not among them" "$build/assay" grade -q -o "$tmp/three" "$tmp/other.rubric" "$tmp/submissions/ada"
 # A program whose Parts 1 and 2 are done and that still shows normals, as the starter code does; with other normals
 # than the starter code's it is not one.
 mkdir "$tmp/course" && cp tools/rubrics/*.dae "$tmp/course"
