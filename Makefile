@@ -4,6 +4,8 @@
 # and the files that it includes test, measure and lint them. Lines that begin with "#: " are `make help`.
 
 BUILD  ?= build
+# One name for one folder: what a script builds by its absolute path has the same dependencies.
+override BUILD := $(patsubst $(CURDIR)/%,%,$(BUILD))
 LIVE   ?=
 ONLY   ?=
 ALPHA  ?= 1e-3

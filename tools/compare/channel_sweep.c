@@ -42,7 +42,8 @@ static void scan(const struct judge *j, const struct pyramid *p, int l, int y, i
          * side, and for those whose normal equivalent, good to 3 %, comes near the largest. */
         struct worst_region *worst = &s->worst[m.statistic];
         bool is_ranked = !m.noise_free && !m.silent;
-        double z = is_ranked ? region_rank(j, &m) : INFINITY;
+        double z =
+            is_ranked ? fmin(region_rank(j, &m), region_missed_z(j, &m, s->channel)) : INFINITY;
         if (is_ranked && (z <= 0 || z < 0.94 * worst->z))
             continue;
         double log10_p = region_log10_p(j, &m, s->channel);
@@ -100,7 +101,7 @@ static bool sweep_band(const struct judge *j, const struct moments *a, const str
     } else {
         add_squared_bias(p, &s->squared);
         if (j->share[STATISTIC_CHI_SQUARE] > 0)
-            chi_square_gather(j, p, s->part, s->tiles + first);
+            chi_square_gather(j, p, s->channel, s->part, s->tiles + first);
     }
     return true;
 }

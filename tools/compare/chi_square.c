@@ -7,19 +7,19 @@
 
 /* The square of the normal equivalent of a region's excess over its margin. If the bias is within the
  * margin, it is stochastically no larger than by noise alone. */
-static double square(const struct measured *m)
+static double square(const struct judge *j, const struct measured *m, int channel)
 {
     double t = region_excess_t(m);
     if (t <= 0)
         return 0;
-    double z = stats_hill_z(t, m->dof_normal);
+    double z = fmin(stats_hill_z(t, m->dof_normal), region_missed_z(j, m, channel));
     return z * z;
 }
 
 /* A region without noise adds nothing, but is not a gap in the partition either. */
-static struct part part_of(const struct measured *m)
+static struct part part_of(const struct judge *j, const struct measured *m, int channel)
 {
-    return (struct part){m->noise_free ? 0 : square(m), !m->noise_free, true};
+    return (struct part){m->noise_free ? 0 : square(j, m, channel), !m->noise_free, true};
 }
 
 /* The next level each of whose regions is a union of regions of level l, or -1. Sides are powers of 2 up
@@ -34,7 +34,7 @@ static int next_level(const struct pyramid *p, int l)
 
 /* Merges level `below` into level l: a region becomes its parts if they cover it, itself if it is
  * testable, else whatever parts there are. */
-static void merge(const struct judge *j, const struct pyramid *p, int below, int l,
+static void merge(const struct judge *j, const struct pyramid *p, int channel, int below, int l,
                   const struct part *from, struct part *to)
 {
     const struct pyramid_level *fine = &p->level[below], *coarse = &p->level[l];
@@ -54,7 +54,7 @@ static void merge(const struct judge *j, const struct pyramid *p, int below, int
             continue;
         struct measured m = region_measure(j, &coarse->cell[i], pyramid_rect(p, l, i));
         if (region_is_normal(j, &m))
-            to[i] = part_of(&m);
+            to[i] = part_of(j, &m, channel);
     }
 }
 
@@ -64,7 +64,7 @@ static size_t regions_of(const struct pyramid *p, int level)
 }
 
 /* Starts with every testable region of level 0 by itself. */
-static void begin(const struct judge *j, const struct pyramid *p, struct part *part)
+static void begin(const struct judge *j, const struct pyramid *p, int channel, struct part *part)
 {
     size_t regions = regions_of(p, 0);
     for (size_t i = 0; i < regions; i++) {
@@ -73,17 +73,17 @@ static void begin(const struct judge *j, const struct pyramid *p, struct part *p
             continue;
         struct measured m = region_measure(j, &p->level[0].cell[i], pyramid_rect(p, 0, i));
         if (region_is_normal(j, &m))
-            part[i] = part_of(&m);
+            part[i] = part_of(j, &m, channel);
     }
 }
 
 /* Merges from level 0 to level `last`; returns the result, in one half of `part`, which holds level 0 twice. */
-static struct part *merge_up(const struct judge *j, const struct pyramid *p, int last,
+static struct part *merge_up(const struct judge *j, const struct pyramid *p, int channel, int last,
                              struct part *part)
 {
     struct part *from = part, *to = part + regions_of(p, 0);
     for (int l = 0, next; l < last && (next = next_level(p, l)) >= 0; l = next) {
-        merge(j, p, l, next, from, to);
+        merge(j, p, channel, l, next, from, to);
         struct part *swap = from;
         from = to;
         to = swap;
@@ -91,18 +91,18 @@ static struct part *merge_up(const struct judge *j, const struct pyramid *p, int
     return from;
 }
 
-void chi_square_gather(const struct judge *j, const struct pyramid *band, struct part *part,
-                       struct part *tiles)
+void chi_square_gather(const struct judge *j, const struct pyramid *band, int channel,
+                       struct part *part, struct part *tiles)
 {
-    begin(j, band, part);
-    memcpy(tiles, merge_up(j, band, band->tile_level, part),
+    begin(j, band, channel, part);
+    memcpy(tiles, merge_up(j, band, channel, band->tile_level, part),
            regions_of(band, band->tile_level) * sizeof *tiles);
 }
 
 static void test(struct judge *j, const struct pyramid *above, int channel, int side,
                  struct part *tiles, struct chi_square *d)
 {
-    const struct part *all = merge_up(j, above, above->num_levels - 1, tiles);
+    const struct part *all = merge_up(j, above, channel, above->num_levels - 1, tiles);
     if (all->num < 2) /* one square is what the pyramid tests */
         return;
     j->num_tests[STATISTIC_CHI_SQUARE]++;
@@ -117,6 +117,6 @@ void chi_square_test(struct judge *j, const struct pyramid *above, int channel, 
     test(j, above, channel, 1, tiles, d);
     if (above->level[0].side == 1)
         return;
-    begin(j, above, tiles);
+    begin(j, above, channel, tiles);
     test(j, above, channel, above->level[0].side, tiles, d);
 }

@@ -21,8 +21,8 @@ struct part {
 };
 
 /* The finest partition of a band, as parts of its tiles. `part`: workspace for twice the band's pixels. */
-void chi_square_gather(const struct judge *j, const struct pyramid *band, struct part *part,
-                       struct part *tiles);
+void chi_square_gather(const struct judge *j, const struct pyramid *band, int channel,
+                       struct part *part, struct part *tiles);
 
 /* Two tests in this channel: over the finest partition of the image into testable regions, of which `tiles` has what was
  * gathered and room for as many, and over one whose regions are reporting tiles or larger. Counts them in j->num_tests. */

@@ -6,6 +6,9 @@
 #include <string.h>
 
 static const double floor_fraction = 0.05; /* of the mean luminance of B */
+/* So many times the other side's paths show what it has missed. With fewer, the longer side's own skewness
+ * keeps regions of rare events from being tested (measured: 256 times no false DIFFERENT, 1024 times half). */
+static const double far_longer = 256;
 
 static bool check_options(const struct compare_options *opt, struct err *e)
 {
@@ -45,9 +48,9 @@ static bool check_pixel(const struct moments *m, size_t p, bool exact, struct er
     return true;
 }
 
-/* Checks one side and gathers what it contributes to the judge. `event`: the typical
+/* Checks one side and gathers what it contributes to the judge; *observed: its observations. `event`: the typical
  * brightness of an observation that matters, E[x^2]/E[x]; for something rarely seen, its brightness when seen. */
-static bool check_side(const struct moments *m, struct judge *j, struct err *e)
+static bool check_side(const struct moments *m, struct judge *j, double *observed, struct err *e)
 {
     bool exact = moments_is_exact(m), replicates = strcmp(m->unit, "replicate") == 0;
     if (strcmp(m->unit, "stratified") == 0)
@@ -62,6 +65,7 @@ static bool check_side(const struct moments *m, struct judge *j, struct err *e)
         if (!check_pixel(m, p, exact, e))
             return false;
         double n = moments_n(m, p);
+        *observed += n;
         if (!exact && n < j->n_min)
             j->n_min = n;
         for (size_t c = 0; c < 3; c++) {
@@ -90,6 +94,19 @@ static bool check_shared(const struct moments *a, const struct moments *b, struc
             "A and B hold the same observations in %zu of %zu pixels: rendered with the same seed, or copied? (--paired judges them as pairs)",
             shared, pixels);
     return true;
+}
+
+/* Does b hold so many more paths that it shows what a may have missed? */
+static bool is_far_longer(const struct moments *b, double observed_b, const struct moments *a,
+                          double observed_a)
+{
+    if (moments_is_exact(a) || moments_noise_is_unknown(a))
+        return false;
+    if (moments_is_exact(b))
+        return true;
+    if (a->spp > 0 && b->spp > 0)
+        return observed_b * b->spp >= far_longer * observed_a * a->spp;
+    return strcmp(a->unit, b->unit) == 0 && observed_b >= far_longer * observed_a;
 }
 
 /* Shares of alpha. The share of a statistic that does not apply goes to the others in proportion.
@@ -128,10 +145,13 @@ bool input_checks_run(const struct moments *a, const struct moments *b,
     j->exact[0] = moments_is_exact(a);
     j->exact[1] = moments_is_exact(b);
     set_shares(a, b, j);
-    if (!check_side(a, j, e))
+    double observed[2] = {0, 0};
+    if (!check_side(a, j, &observed[0], e))
         return err_prefix(e, "A");
-    if (!check_side(b, j, e))
+    if (!check_side(b, j, &observed[1], e))
         return err_prefix(e, "B");
+    j->may_miss[0] = is_far_longer(b, observed[1], a, observed[0]);
+    j->may_miss[1] = is_far_longer(a, observed[0], b, observed[1]);
     if (!check_shared(a, b, e))
         return false;
     size_t pixels = (size_t)b->width * (size_t)b->height;

@@ -4,11 +4,12 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* The contributions of some neighbouring pixels to struct matched_sums. */
 enum { CHUNK = 64 };
 struct chunk {
-    double w[3][CHUNK], unit[3][CHUNK], size[3][CHUNK];
+    double w[3][CHUNK], unit[3][CHUNK], size[3][CHUNK], event[CHUNK];
     double mean[2][CHUNK], v[2][CHUNK], k3[2][CHUNK];
     double var_v[2][CHUNK], var_v_normal[2][CHUNK], var_k3[2][CHUNK];
 };
@@ -60,6 +61,7 @@ ISA_CLONES static void add_chunk(const struct judge *j, const struct error_modes
     const size_t at = error_modes_at(f, x, y);
     const double floor = j->floor, *coupled = change->coupled + x;
     struct chunk t;
+    memset(t.event, 0, sizeof t.event);
     for (size_t c = 0; c < 3; c++) {
         const size_t first = c * f->room + at;
         const double *a = f->mean[0] + first, *b = f->mean[1] + first, *d = change->d[c] + x,
@@ -69,6 +71,7 @@ ISA_CLONES static void add_chunk(const struct judge *j, const struct error_modes
             t.w[c][i] = w;
             t.unit[c][i] = fabs(w) * larger(b[i], floor);
             t.size[c][i] = fabs(w) * larger(a[i], b[i]);
+            t.event[i] += fabs(w) * j->event[c];
         }
     }
     weigh(f, 0, at, num, &t);
@@ -79,6 +82,7 @@ ISA_CLONES static void add_chunk(const struct judge *j, const struct error_modes
             s.unit += t.unit[c][i];
             s.size += t.size[c][i];
         }
+        s.largest = larger(s.largest, t.event[i]);
         s.cell.a += t.mean[0][i];
         s.cell.b += t.mean[1][i];
         s.cell.va += t.v[0][i];
@@ -156,7 +160,7 @@ void matched_filter_test(struct judge *j, const struct matched_filter *f,
         const struct matched_sums *s = &f->sums[k];
         if (!error_mode_applies(&f->modes, k))
             continue;
-        struct measured m = region_measure_weighted(j, &s->cell, s->unit, s->size);
+        struct measured m = region_measure_weighted(j, &s->cell, s->unit, s->size, s->largest);
         if (m.noise_free || !region_is_normal(j, &m))
             continue;
         j->num_tests[STATISTIC_MATCHED_FILTER]++;

@@ -10,6 +10,7 @@ struct matched_sums {
     struct cell cell; /* w A and w B, as if they were a region */
     double unit;      /* |w| unit of B */
     double size;      /* |w| max(A, B) */
+    double largest;   /* not a sum: the most that |w| makes of the judge's event in one pixel */
 };
 struct matched_filter {
     struct error_modes modes;

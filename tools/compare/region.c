@@ -55,6 +55,7 @@ static struct measured measure(const struct judge *j, const struct cell *cell, d
                          .tolerance = float_tolerance * size + cell->tolerance,
                          .skew_around = INFINITY,
                          .log10_alike = cell->log10_alike,
+                         .event_weight = 1,
                          .statistic = statistic};
     m.v = cell->va + cell->vb;
     m.v_margin = cell->va + (1 + m.margin) * (1 + m.margin) * cell->vb;
@@ -78,13 +79,17 @@ struct measured region_measure(const struct judge *j, const struct cell *cell, s
     double least = pow(float_tolerance * fmax(cell->a, cell->b), 2);
     m.silent = !m.noise_free && !j->is_pooled &&
                ((cell->va <= least && !j->exact[0]) || (cell->vb <= least && !j->exact[1]));
+    m.may_have_missed = (j->may_miss[0] && m.d < 0) || (j->may_miss[1] && m.d > 0);
     return m;
 }
 
 struct measured region_measure_weighted(const struct judge *j, const struct cell *cell, double unit,
-                                        double size)
+                                        double size, double largest)
 {
-    return measure(j, cell, unit, size, j->opt.margin_tile, STATISTIC_MATCHED_FILTER);
+    struct measured m = measure(j, cell, unit, size, j->opt.margin_tile, STATISTIC_MATCHED_FILTER);
+    m.may_have_missed = j->may_miss[0] || j->may_miss[1];
+    m.event_weight = largest / j->event[CHANNEL_LUMINANCE];
+    return m;
 }
 
 /* ln of the factor by which a tail probability at x may be off [Shao99]. */
@@ -163,11 +168,13 @@ double region_excess_t(const struct measured *m)
 /* log10 of the chance that observations as bright as any seen would all have been missed, if they
  * were just frequent enough to make up for the excess: each adds event/n, so excess n/event are
  * expected. */
-static double log10_p_missed(const struct judge *j, double excess, int channel)
+static double log10_p_missed(const struct judge *j, const struct measured *m, double excess,
+                             int channel)
 {
     if (excess <= 0)
         return 0;
-    return fmax(region_smallest_log10_p, -excess * j->n_min / (j->event[channel] * log(10)));
+    double each = j->event[channel] * m->event_weight / j->n_min;
+    return fmax(region_smallest_log10_p, -excess / (each * log(10)));
 }
 
 /* log10 p of a region without noise whose |d| exceeds margin and tolerance by `excess`. If
@@ -175,7 +182,7 @@ static double log10_p_missed(const struct judge *j, double excess, int channel)
 static double log10_p_noise_free(const struct judge *j, const struct measured *m, double excess,
                                  int channel)
 {
-    double missed = log10_p_missed(j, excess, channel);
+    double missed = log10_p_missed(j, m, excess, channel);
     if (excess <= 0 || m->log10_alike == 0)
         return missed;
     return fmin(0, log10(2) + fmin(missed, m->log10_alike));
@@ -205,7 +212,17 @@ double region_log10_p(const struct judge *j, const struct measured *m, int chann
     if (m->noise_free)
         return log10_p_noise_free(j, m, excess, channel);
     double log10_p = raised_log10_p(m, fmax(0, region_excess_t(m)), skew_of_p(j, m));
-    return m->silent ? fmax(log10_p, log10_p_missed(j, excess, channel)) : log10_p;
+    return m->silent || m->may_have_missed ? fmax(log10_p, log10_p_missed(j, m, excess, channel))
+                                           : log10_p;
+}
+
+double region_missed_z(const struct judge *j, const struct measured *m, int channel)
+{
+    if (!m->may_have_missed)
+        return INFINITY;
+    double excess = fabs(m->d) - m->margin * m->unit - m->tolerance;
+    double log10_p = log10_p_missed(j, m, excess, channel);
+    return log10_p < -300 ? INFINITY : stats_normal_quantile(pow(10, log10_p) / 2);
 }
 
 double region_rank(const struct judge *j, const struct measured *m)
@@ -219,7 +236,8 @@ double region_log10_p_equal(const struct judge *j, const struct measured *m, int
     double excess = fmax(0, fabs(m->d) - m->tolerance);
     if (m->noise_free)
         return log10_p_noise_free(j, m, excess, channel);
-    return raised_log10_p(m, excess / sqrt(m->v), m->skew);
+    double log10_p = raised_log10_p(m, excess / sqrt(m->v), m->skew);
+    return m->may_have_missed ? fmax(log10_p, log10_p_missed(j, m, excess, channel)) : log10_p;
 }
 
 double region_t(const struct measured *m)
@@ -257,15 +275,14 @@ double region_mdb(const struct judge *j, const struct measured *m, int channel)
 {
     double tests = (double)j->num_tests[m->statistic], reach, x = 0;
     double level = j->opt.alpha * j->share[m->statistic] / tests;
+    double missed = j->event[channel] / j->n_min * -log(level);
     if (m->noise_free) {
-        reach = m->log10_alike + log10(2) <= log10(level)
-                    ? 0
-                    : j->event[channel] / j->n_min * -log(level);
+        reach = m->log10_alike + log10(2) <= log10(level) ? 0 : missed;
     } else {
         raised_quantile(skew_of_p(j, m), level / 2, m->dof, 2 * skew_limit_raised, &x);
         reach = sqrt(m->v_margin) * (x + stats_t_quantile(0.05, m->dof));
-        if (m->silent)
-            reach = fmax(reach, j->event[channel] / j->n_min * -log(level));
+        if (m->silent || j->may_miss[0] || j->may_miss[1])
+            reach = fmax(reach, missed);
     }
     return fmin(region_mdb_none, m->margin + (m->tolerance + reach) / m->unit);
 }

@@ -14,6 +14,7 @@ struct judge {
     double event[NUM_CHANNELS];   /* brightness of the brightest kind of single observation seen */
     bool is_pooled;               /* each pixel has the skewness of the whole image (noise_estimate.h) */
     bool exact[2];                /* A, B are closed forms */
+    bool may_miss[2];             /* A, B: the other is one, or far longer, and shows what this one missed */
     double n_min;                 /* fewest observations of any pixel; INFINITY if both are exact */
     double share[NUM_STATISTICS]; /* of alpha */
     /* Per statistic: */
@@ -39,8 +40,12 @@ struct measured {
      * have been alike by chance, as where roulette ends one path in twenty, and its mean may be off
      * for that reason. */
     bool silent;
-    bool noise_free; /* the standard error is within that of float32 arithmetic */
-    int statistic;   /* by which it is tested */
+    /* This d could come from bright samples that one side has missed and the other, a closed form or far
+     * longer, has not: it is the darker one. A sum with weights may be changed either way. */
+    bool may_have_missed;
+    double event_weight; /* largest weight of one observation in d; 1 for a region */
+    bool noise_free;     /* the standard error is within that of float32 arithmetic */
+    int statistic;       /* by which it is tested */
 };
 
 struct measured region_measure(const struct judge *j, const struct cell *cell, struct rect r);
@@ -54,9 +59,10 @@ bool region_is_hopeless(const struct judge *j, const struct cell *cell, int stat
 double region_pixel_t(const struct judge *j, const struct cell *cell, double *relative);
 
 /* The same for sums over the image with weights w, which may be negative: unit = sum |w| unit, size =
- * sum |w| max(A, B). A bias inside the margin of a tile in each pixel is inside the margin of this. */
+ * sum |w| max(A, B), largest: the most that |w| makes of a pixel's j->event. A bias inside the margin of a tile in
+ * each pixel is inside the margin of this. */
 struct measured region_measure_weighted(const struct judge *j, const struct cell *cell, double unit,
-                                        double size);
+                                        double size, double largest);
 
 /* Fills m->skew_around: the skewness that this region would have with the ratio of third cumulant
  * to variance of a larger region around it. A small region can look symmetric by luck, because its
@@ -75,9 +81,12 @@ bool region_testable(const struct judge *j, const struct measured *m);
 double region_excess_t(const struct measured *m);
 
 /* Two-sided log10 p of the hypothesis |bias| <= margin. The skewness factor raises it where the
- * guard asks for that. For a silent region it is at least the probability that bright samples which
- * would explain the difference were all missed. */
+ * guard asks for that. For a silent region, and for one that may have missed them, it is at least the probability
+ * that bright samples which would explain the difference were all missed. */
 double region_log10_p(const struct judge *j, const struct measured *m, int channel);
+
+/* The normal equivalent of that probability; INFINITY where nothing can have been missed. */
+double region_missed_z(const struct judge *j, const struct measured *m, int channel);
 
 /* The normal equivalent of that p, accurate to about 3 %, for a region with noise: for ranking only. */
 double region_rank(const struct judge *j, const struct measured *m);
