@@ -1,5 +1,7 @@
 #include "independence.h"
 
+#include "shared_noise.h"
+
 #include <assert.h>
 #include <gsl/gsl_cdf.h>
 #include <math.h>
@@ -34,17 +36,7 @@ void replicates_free(struct replicates *r)
     *r = (struct replicates){0};
 }
 
-/* Sums over blocks from which z_of() computes the moments over permutations. */
-struct sums {
-    size_t k;
-    double *g;     /* k x k, lower triangle: sum of G_b */
-    double *block; /* k x k, lower triangle: one G_b */
-    double s0, s0_squared, s1, s2;
-    int pixels, blocks;
-};
-
-/* The residuals e[k] of one pixel; false if it has no noise. */
-static bool standardize(const struct replicates *r, size_t pixel, double *e)
+bool replicates_residuals(const struct replicates *r, size_t pixel, double *e)
 {
     size_t stride = (size_t)r->width * (size_t)r->height;
     double mean = 0, m2 = 0;
@@ -61,6 +53,15 @@ static bool standardize(const struct replicates *r, size_t pixel, double *e)
         e[k] *= sqrt((r->num - 1) / m2);
     return true;
 }
+
+/* Sums over blocks from which z_of() computes the moments over permutations. */
+struct sums {
+    size_t k;
+    double *g;     /* k x k, lower triangle: sum of G_b */
+    double *block; /* k x k, lower triangle: one G_b */
+    double s0, s0_squared, s1, s2;
+    int pixels, blocks;
+};
 
 /* Adds the lower triangle of the sum of e e' over n pixels, each a vector e of k numbers. */
 static void add_products(double *g, const double *e, size_t n, size_t k)
@@ -109,7 +110,8 @@ static void add_blocks(struct sums *s, const struct replicates *r, int side, dou
             size_t n = 0;
             for (int y = y0; y < y0 + side && y < r->height; y++)
                 for (int x = x0; x < x0 + side && x < r->width; x++)
-                    n += standardize(r, (size_t)y * (size_t)r->width + (size_t)x, e + n * s->k);
+                    n += replicates_residuals(r, (size_t)y * (size_t)r->width + (size_t)x,
+                                              e + n * s->k);
             if (n > 0)
                 add_block(s, e, n);
         }
@@ -181,33 +183,6 @@ static void test_batches(const struct sums *s, struct independence *out)
     out->batches_z = z_of(s, w, 2 * sum);
 }
 
-/* Pairs of pixels p, q in one square: C = sum over k of e_k(p) e_k(q) has the mean 0 and, over permutations of one
- * against the other, the variance K - 1; different pairs are uncorrelated. */
-static void measure_square(const struct replicates *r, int side, double *e, double *sum,
-                           double *mean, double *se)
-{
-    size_t k = (size_t)r->num;
-    double products = 0, pairs = 0;
-    for (int y0 = 0; y0 < r->height; y0 += side)
-        for (int x0 = 0; x0 < r->width; x0 += side) {
-            double n = 0;
-            memset(sum, 0, k * sizeof *sum);
-            for (int y = y0; y < y0 + side && y < r->height; y++)
-                for (int x = x0; x < x0 + side && x < r->width; x++)
-                    if (standardize(r, (size_t)y * (size_t)r->width + (size_t)x, e)) {
-                        n++;
-                        for (size_t i = 0; i < k; i++)
-                            sum[i] += e[i];
-                    }
-            for (size_t i = 0; i < k; i++)
-                products += sum[i] * sum[i] / 2;
-            products -= n * (double)(k - 1) / 2;
-            pairs += n * (n - 1) / 2;
-        }
-    *mean = pairs > 0 ? products / pairs / (double)(k - 1) : 0;
-    *se = pairs > 0 ? 1 / sqrt(pairs * (double)(k - 1)) : 0;
-}
-
 static int block_side(const struct replicates *r)
 {
     int side = LARGEST_BLOCK;
@@ -252,15 +227,22 @@ bool independence_test(const struct replicates *r, double alpha, struct independ
     if (k < FEWEST_REPLICATES)
         return true;
     struct sums s = {.k = k};
-    s.g = calloc((2 * k + side * side + 1) * k, sizeof *s.g); /* one block for all */
+    s.g = calloc((2 * k + side * side) * k, sizeof *s.g); /* one block for all */
     if (s.g == NULL)
         return err_set(e, "independence of replicates: out of memory");
     s.block = s.g + k * k;
-    double *x = s.block + k * k, *sum = x + side * side * k;
-    add_blocks(&s, r, (int)side, x);
+    add_blocks(&s, r, (int)side, s.block + k * k);
     out->pixels = s.pixels;
-    for (int i = 0; i < NUM_SQUARES; i++)
-        measure_square(r, 2 << i, x, sum, &out->square_r[i], &out->square_se[i]);
+    struct shared_noise shared;
+    if (!shared_noise_measure(r, &shared, e)) {
+        free(s.g);
+        return false;
+    }
+    for (int i = 0; i < NUM_SQUARES; i++) {
+        const struct square_noise *q = &shared.square[i < shared.num ? i : shared.num - 1];
+        out->square_r[i] = q->r;
+        out->square_se[i] = q->se;
+    }
     if (s.blocks >= FEWEST_BLOCKS)
         judge(&s, alpha, fmax(r->sharing, 1), out);
     free(s.g);

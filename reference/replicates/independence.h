@@ -45,6 +45,8 @@ NODISCARD bool replicates_alloc(struct replicates *r, int width, int height, int
                                 struct err *e);
 void replicates_add(struct replicates *r, const float *pixels_rgb);
 void replicates_free(struct replicates *r);
+/* e[k], k < num, of one pixel; false if it has no noise. */
+bool replicates_residuals(const struct replicates *r, size_t pixel, double *e);
 
 /* Chance that independent replicates fail any of the four tests. Small, as a whole suite with both engines is
  * rendered again and again, and a replicate that was used twice is found at any alpha. */

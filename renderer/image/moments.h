@@ -23,6 +23,9 @@ struct moments {
      * per pixel, absolute, at worst in the same direction in all pixels. NULL: none. Never stored in a
      * file; moments_merge() refuses it. */
     double *tolerance;
+    /* Of replicates whose pixels share noise: by how much M2 is larger than that of a pixel, so that it is right for sums
+     * of many (reference/replicates/shared_noise.h). 0: they share none. Never stored in a file. */
+    double sharing;
     /* The same as float32, in half the memory; n to m3 are then NULL. Only for comparisons, which read by
      * moments_n() to moments_m3(), moments_run() or moments_unpack(). */
     struct {

@@ -2,6 +2,7 @@
 #include "renderer/base/cli.h"
 #include "tools/validate/compare_job.h"
 #include "tools/compare/region.h"
+#include "tools/compare/variance_ratio.h"
 #include "tools/compare/verdict.h"
 #include "tools/results/results.h"
 #include "commands.h"
@@ -96,9 +97,11 @@ static const struct cli_option options[] = {
      "encoding curve of PNG files (radiance to code): srgb, linear,\n"
      "gamma=G (G in 0.2 to 5), or cgl, the assignment's",
      .read = read_curve},
-    {0, "spp-a", "N", "samples per pixel of A, if its file only states a variance",
-     TO(job.input[0].spp), 3, 1e12},
-    {0, "spp-b", "N", "the same for B", TO(job.input[1].spp), 3, 1e12},
+    {0, "spp-a", "N",
+     "samples per pixel of A, if its file only states a variance, or of\n"
+     "each render of a directory",
+     TO(job.input[0].spp), 1, 1e12},
+    {0, "spp-b", "N", "the same for B", TO(job.input[1].spp), 1, 1e12},
     {0, "expect", "VERDICT",
      "verdict that gives exit code 0 (EQUIVALENT; with --accept-mdb\n"
      "NO DIFFERENCE FOUND)",
@@ -140,13 +143,13 @@ static double round_up(double x)
 static void print_noise(const struct variance_ratio *v)
 {
     if (v->valid)
-        printf("noise: the variance of one path of A is %.3g [%.3g, %.3g] times that of B\n",
-               v->ratio, v->lo, v->hi);
+        printf("noise: the variance of one %s of A is %.3g [%.3g, %.3g] times that of B\n",
+               variance_ratio_of(v), v->ratio, v->lo, v->hi);
     else if (v->ratio > 0)
-        printf(
-            "noise: the variance of one path of A is about %.2g times that of B; rare bright paths "
-            "leave no interval\n",
-            v->ratio);
+        printf("noise: the variance of one %s of A is about %.2g times that of B; %s leave no "
+               "interval\n",
+               variance_ratio_of(v), v->ratio,
+               v->is_shared ? "pixels that share noise" : "rare bright paths");
 }
 
 static void print_result(const struct compare_job *job, const struct compared *c)

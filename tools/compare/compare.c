@@ -153,8 +153,8 @@ static void fill_statistics(struct judge *j, const struct worst_region worst[2],
     if (fill_statistic(j, STATISTIC_MATCHED_FILTER, directed, out))
         snprintf(st[STATISTIC_MATCHED_FILTER].what, sizeof st->what, "%s", error_mode_name[like]);
     if (fill_statistic(j, STATISTIC_VARIANCE, noise, out))
-        snprintf(st[STATISTIC_VARIANCE].what, sizeof st->what, "variance of a path: %.3g times",
-                 out->variance.ratio);
+        snprintf(st[STATISTIC_VARIANCE].what, sizeof st->what, "variance of a %s: %.3g times",
+                 variance_ratio_of(&out->variance), out->variance.ratio);
 }
 
 /* How far the smallest p of a statistic is below its share; it rejects from -log10(alpha) on. */

@@ -48,7 +48,9 @@ struct hint {
  * together, and its 1 - 2 alpha interval. lo may be 0. */
 struct variance_ratio {
     double ratio, lo, hi;
-    bool valid; /* both sides have noise of a kind that compares, and enough of it to know */
+    bool valid;     /* both sides have noise of a kind that compares, and enough of it to know */
+    bool of_paths;  /* false: of observations, "render" for short */
+    bool is_shared; /* pixels share noise: the ratio is that of single pixels and not tested */
 };
 extern const char *const statistic_name[NUM_STATISTICS]; /* "image", "pyramid", .. */
 

@@ -38,7 +38,7 @@ struct pixels {
 static double variance(const struct moments *m, size_t p)
 {
     return (moments_m2(m, 3 * p) + moments_m2(m, 3 * p + 1) + moments_m2(m, 3 * p + 2)) /
-           (moments_n(m, p) - 1);
+           ((moments_n(m, p) - 1) * (m->sharing > 1 ? m->sharing : 1));
 }
 
 static struct pixels sum_pixels(const struct moments *a, const struct moments *b, double paths_a,
@@ -97,7 +97,8 @@ static bool interval(const struct pixels *s, double x, struct variance_ratio *ou
 struct variance_ratio variance_ratio_test(const struct moments *a, const struct moments *b,
                                           const struct judge *j, double *log10_p, bool *testable)
 {
-    struct variance_ratio out = {0};
+    struct variance_ratio out = {.of_paths = a->spp > 0 && b->spp > 0,
+                                 .is_shared = a->sharing > 1 || b->sharing > 1};
     double paths_a = paths(a, b), paths_b = paths(b, a);
     *log10_p = 0;
     *testable = false;
@@ -106,15 +107,15 @@ struct variance_ratio variance_ratio_test(const struct moments *a, const struct 
     struct pixels s = sum_pixels(a, b, paths_a, paths_b);
     if (!(s.a > 0 && s.b > 0) || s.num < 3)
         return out;
-    out.ratio = s.a / s.b;
+    out.ratio = out.lo = out.hi = s.a / s.b;
+    if (out.is_shared) /* the pixels' variances depend on each other */
+        return out;
     double g = skewness(&s, out.ratio), x = 0, factor = 0;
     for (int i = 0; i < 4; i++) {
         x = stats_t_quantile(j->opt.alpha * exp(-factor), s.num - 1);
         factor = fmin(skew_limit_widened, g * x * x * x / 3);
     }
     out.valid = factor < skew_limit_widened && interval(&s, x, &out);
-    if (!out.valid)
-        out.lo = out.hi = out.ratio;
 
     double limit = 1 + j->opt.margin_variance;
     double r = out.ratio > limit ? limit : out.ratio < 1 / limit ? 1 / limit : out.ratio;
@@ -124,6 +125,11 @@ struct variance_ratio variance_ratio_test(const struct moments *a, const struct 
     if (*testable)
         *log10_p = fmax(region_smallest_log10_p, stats_t_log10_p(t, s.num - 1));
     return out;
+}
+
+const char *variance_ratio_of(const struct variance_ratio *v)
+{
+    return v->of_paths ? "path" : "render";
 }
 
 static bool same_pixel(const struct moments *a, const struct moments *b, size_t p)

@@ -10,6 +10,9 @@
 struct variance_ratio variance_ratio_test(const struct moments *a, const struct moments *b,
                                           const struct judge *j, double *log10_p, bool *testable);
 
+/* What it is the variance of: "path" or "render". */
+const char *variance_ratio_of(const struct variance_ratio *v);
+
 /* In how many pixels A and B hold the same observations (all moments agree bit by bit, and there is
  * noise), or 0 if that many can agree by chance. */
 size_t variance_ratio_shared(const struct moments *a, const struct moments *b);

@@ -2,6 +2,7 @@
 
 #include "pyramid.h"
 #include "region.h"
+#include "variance_ratio.h"
 #include "tools/stats/distributions.h"
 
 #include <assert.h>
@@ -116,14 +117,13 @@ static void judge_variance(struct comparison *c, const struct compare_options *o
                  "counted");
     else if (!v->valid)
         snprintf(text, size,
-                 "the variance could not be tested, being too skewed: it is about %.3g times that "
-                 "of B",
-                 v->ratio);
+                 "the variance could not be tested, %s: it is about %.3g times that of B",
+                 v->is_shared ? "as pixels share noise" : "being too skewed", v->ratio);
     else
         snprintf(text, size,
-                 "the variance of a path is %.3g times that of B [%.3g, %.3g], which is not inside "
+                 "the variance of a %s is %.3g times that of B [%.3g, %.3g], which is not inside "
                  "the margin of %.3g %%",
-                 v->ratio, v->lo, v->hi, 100 * opt->margin_variance);
+                 variance_ratio_of(v), v->ratio, v->lo, v->hi, 100 * opt->margin_variance);
     used = strlen(text);
     snprintf(text + used, size - used, "; mean: %.*s", (int)(size - used - 9), mean);
     c->verdict = VERDICT_INCONCLUSIVE;
@@ -178,10 +178,10 @@ static void judge_different(struct comparison *c, const struct compare_options *
                  verdict_p(st->log10_p).s);
     } else {
         snprintf(c->reason, size,
-                 "the variance of a path is %.3g times that of B [%.3g, %.3g], beyond the margin "
+                 "the variance of a %s is %.3g times that of B [%.3g, %.3g], beyond the margin "
                  "of %.3g %%, %s",
-                 c->variance.ratio, c->variance.lo, c->variance.hi, 100 * opt->margin_variance,
-                 verdict_p(st->log10_p).s);
+                 variance_ratio_of(&c->variance), c->variance.ratio, c->variance.lo, c->variance.hi,
+                 100 * opt->margin_variance, verdict_p(st->log10_p).s);
     }
 }
 

@@ -54,6 +54,20 @@ static bool channels_of(const char *path, const struct image *im, int at[3], int
                    im->names[0], im->channels);
 }
 
+/* Paths per pixel, mean over the image, that a moments EXR states; else 0. */
+static double paths_of(const struct image *im)
+{
+    const int n = image_channel(im, "n");
+    const char *each = image_get_attr(im, "assay:spp");
+    if (n < 0 || each == NULL || image_channel(im, "M2.R") < 0)
+        return 0;
+    const size_t pixels = (size_t)im->width * (size_t)im->height;
+    double sum = 0;
+    for (size_t p = 0; p < pixels; p++)
+        sum += im->data[(size_t)im->channels * p + (size_t)n];
+    return fmax(0, sum / (double)pixels * atof(each));
+}
+
 bool image_file_from_image(const char *path, const struct image *im, const struct image_info *info,
                            struct image_file *out, struct err *e)
 {
@@ -61,6 +75,7 @@ bool image_file_from_image(const char *path, const struct image *im, const struc
     *out = (struct image_file){.width = im->width, .height = im->height, .info = *info};
     if (!check_file(path, info, e) || !channels_of(path, im, at, &alpha, e))
         return false;
+    out->spp = paths_of(im);
     out->num_other = im->channels - (at[0] == at[1] ? 1 : 3) - (alpha >= 0);
     size_t pixels = (size_t)im->width * (size_t)im->height;
     out->rgb = malloc(3 * pixels * sizeof *out->rgb);

@@ -10,6 +10,7 @@ struct image_file {
     float *rgb; /* 3 per pixel, row 0 at the top; of an integer file, codes over the largest code */
     struct image_info info;
     int num_other; /* channels of the file that are ignored */
+    double spp;    /* paths per pixel, mean over the image, of a moments EXR; else 0, not known */
 };
 
 /* EXR, HDR (RGBE), PFM, and PNG of 8 or 16 bits. Channels R, G, B, or Y alone for all three; A only

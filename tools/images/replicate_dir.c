@@ -58,6 +58,7 @@ static bool read_one(const char *dir, struct replicate_dir *r, int k, struct err
     r->width = p.width;
     r->height = p.height;
     r->rgb[k] = p.rgb;
+    r->spp = p.spp > 0 && (k == 0 || r->spp > 0) ? r->spp + p.spp / r->num : 0;
     size_t bytes = 3 * (size_t)r->width * (size_t)r->height * sizeof **r->rgb;
     for (int i = 0; i < k; i++)
         if (memcmp(r->rgb[i], r->rgb[k], bytes) == 0)
@@ -109,7 +110,7 @@ bool replicate_dir_moments(const struct replicate_dir *r, struct moments *out, s
     if (!moments_alloc(out, r->width, r->height, e))
         return false;
     strcpy(out->unit, "replicate");
-    out->spp = 0;
+    out->spp = r->spp;
     for (int k = 0; k < r->num; k++)
         moments_add_image(out, r->rgb[k]);
     return true;

@@ -8,11 +8,12 @@ struct replicate_dir {
     int num, width, height;
     float **rgb; /* num images: 3 floats a pixel */
     char **name; /* their file names, sorted */
+    double spp;  /* paths per pixel of one image, the mean over all; 0: not known */
 };
 
 /* Reads every file of the directory (but hidden ones) in the order of their names. Fails with a line
  * unless all are images of 32-bit floats (image_file.h) of one size, at least 3, no two of them the
- * same ("the seed was ignored"). The caller frees with replicate_dir_free(). */
+ * same ("the seed was ignored"). spp is known if all state it (image_file.h). The caller frees with replicate_dir_free(). */
 NODISCARD bool replicate_dir_read(const char *dir, struct replicate_dir *out, struct err *e);
 void replicate_dir_free(struct replicate_dir *r);
 
@@ -20,7 +21,7 @@ void replicate_dir_free(struct replicate_dir *r);
 bool replicate_dir_share(const struct replicate_dir *a, const struct replicate_dir *b, int *i,
                          int *j);
 
-/* Their moments, unit "replicate", spp 0 (not known). */
+/* Their moments, unit "replicate". */
 NODISCARD bool replicate_dir_moments(const struct replicate_dir *r, struct moments *out,
                                      struct err *e);
 

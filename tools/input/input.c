@@ -12,22 +12,54 @@
 
 static const double most_censored = 0.05;     /* of the image, for EQUIVALENT */
 static const double most_censored_tile = 0.5; /* of a reporting tile */
+static const double sharing_alpha = 1e-6;     /* of "pixels share noise" where they do not */
+enum { most_measured = 64 };                  /* renders that this is measured on */
 
-static bool take_replicates(const char *path, const struct replicate_dir *r, struct input *out,
-                            struct notes *notes, struct err *e)
+/* Fills sharing and unlimited from the renders. */
+static bool measure_sharing(const struct replicate_dir *from, struct input *out, struct err *e)
+{
+    struct replicates r;
+    struct shared_noise s;
+    const struct square_noise *unlimited;
+    const int num = from->num < most_measured ? from->num : most_measured;
+    if (!replicates_alloc(&r, from->width, from->height, num, e))
+        return false;
+    for (int k = 0; k < num; k++)
+        replicates_add(&r, from->rgb[k]);
+    bool ok = shared_noise_measure(&r, &s, e);
+    replicates_free(&r);
+    if (!ok)
+        return false;
+    out->sharing = shared_noise_factor(&s, sharing_alpha, &unlimited);
+    if (unlimited != NULL)
+        out->unlimited = *unlimited;
+    return true;
+}
+
+/* spp: paths per pixel of each; 0: as they say themselves. */
+static bool take_replicates(const char *path, char side, const struct replicate_dir *r, double spp,
+                            struct input *out, struct notes *notes, struct err *e)
 {
     out->kind = INPUT_REPLICATES;
     input_notes_add(notes, "%s: %d replicates, each taken for a render with a seed of its own",
                     path, r->num);
-    return replicate_dir_moments(r, &out->m, e);
+    if (spp > 0 && r->spp > 0)
+        return err_set(e, "%s: --spp-%c: its renders say themselves how many samples they have",
+                       path, side);
+    if (!measure_sharing(r, out, e) || !replicate_dir_moments(r, &out->m, e))
+        return false;
+    if (spp > 0)
+        out->m.spp = spp;
+    return true;
 }
 
-static bool read_directory(const char *path, struct input *out, struct notes *notes, struct err *e)
+static bool read_directory(const char *path, char side, const struct input_options *opt,
+                           struct input *out, struct notes *notes, struct err *e)
 {
     struct replicate_dir r;
     if (!replicate_dir_read(path, &r, e))
         return false;
-    bool ok = take_replicates(path, &r, out, notes, e);
+    bool ok = take_replicates(path, side, &r, opt->spp, out, notes, e);
     replicate_dir_free(&r);
     return ok;
 }
@@ -96,13 +128,9 @@ bool input_read(const char *path, char side, const struct input_options *opt, st
 {
     *out = (struct input){0};
     struct stat st;
-    bool directory = stat(path, &st) == 0 && S_ISDIR(st.st_mode), ok;
-    if (directory && opt->spp > 0)
-        ok = err_set(e, "%s: --spp-%c means nothing for a directory of replicates", path, side);
-    else if (directory)
-        ok = read_directory(path, out, notes, e);
-    else
-        ok = read_file(path, side, opt, out, notes, e);
+    bool directory = stat(path, &st) == 0 && S_ISDIR(st.st_mode);
+    bool ok = directory ? read_directory(path, side, opt, out, notes, e)
+                        : read_file(path, side, opt, out, notes, e);
     if (!ok)
         input_free(out);
     return ok;
@@ -114,17 +142,17 @@ bool input_take(const struct input_memory *memory, const char *name, char side,
 {
     const struct replicate_dir *r = &memory->renders;
     const struct image_file pic = {
-        r->width, r->height, r->num > 0 ? r->rgb[0] : NULL, {.type = memory->type}, 0};
+        r->width, r->height, r->num > 0 ? r->rgb[0] : NULL, {.type = memory->type}, 0, 0};
     *out = (struct input){0};
     bool ok = true;
-    if (opt->spp > 0 && (memory->moments != NULL || r->num > 1)) {
+    if (opt->spp > 0 && memory->moments != NULL) {
         ok = err_set(e, "%s: how many samples it has is known", name);
     } else if (memory->moments != NULL) {
         out->kind = memory->has_m3 ? INPUT_MOMENTS : INPUT_VARIANCE;
         ok = moments_copy(memory->moments, &out->m, e);
     } else if (r->num > 1) {
         ok = r->num >= 3
-                 ? take_replicates(name, r, out, notes, e)
+                 ? take_replicates(name, side, r, opt->spp, out, notes, e)
                  : err_set(e, "%s: has %d images, at least 3 replicates are needed", name, r->num);
     } else {
         ok = plain_image_take(name, side, &pic, opt, out, notes, e);
@@ -211,7 +239,35 @@ static bool pair_images(struct input *a, struct input *b, struct notes *notes, s
 static bool is_ready(const struct input *in)
 {
     return (in->kind == INPUT_MOMENTS || in->kind == INPUT_REPLICATES) && !in->is_xyz &&
-           in->censored == NULL;
+           in->censored == NULL && !(in->sharing > 1);
+}
+
+/* Where sums of pixels vary f times as much as independent pixels would, their variances are taken f times as large,
+ * and third cumulants f^2 times: with weights w of sum 1, f = 1/sum w^2, and sum w^3 >= (sum w^2)^2. */
+static bool allow_for_sharing(struct input *in, char side, struct notes *notes, struct err *e)
+{
+    const double f = in->sharing;
+    const size_t values = 3 * (size_t)in->m.width * (size_t)in->m.height;
+    if (!(f > 1))
+        return true;
+    if (in->unlimited.side > 0)
+        return err_set(
+            e,
+            "%c: pixels of a render share noise over more of the image than can be allowed for "
+            "(sums over %d x %d pixels vary %.2g times as much as independent pixels would): a "
+            "denoiser, a photon map, too few pixels? --exchangeable compares whole images",
+            side, in->unlimited.side, in->unlimited.side, in->unlimited.ratio);
+    for (size_t i = 0; i < values; i++) {
+        in->m.m2[i] *= f;
+        in->m.m3[i] *= f * f;
+    }
+    in->m.sharing = f;
+    input_notes_add(
+        notes,
+        "%c: pixels of a render share noise, as by a pixel filter: sums of many vary %.2g times as much as "
+        "independent pixels would. This is allowed for",
+        side, f);
+    return true;
 }
 
 bool input_pair(struct input *a, struct input *b, struct notes *notes, struct err *e)
@@ -234,6 +290,8 @@ bool input_pair(struct input *a, struct input *b, struct notes *notes, struct er
         return false;
     if (a->kind == INPUT_IMAGE || b->kind == INPUT_IMAGE)
         return pair_images(a, b, notes, e);
+    if (!allow_for_sharing(a, 'A', notes, e) || !allow_for_sharing(b, 'B', notes, e))
+        return false;
     bool lacks_a = a->kind == INPUT_VARIANCE, lacks_b = b->kind == INPUT_VARIANCE;
     return (!lacks_a && !lacks_b) || third_moment_bound(&a->m, &b->m, lacks_a, lacks_b, e);
 }

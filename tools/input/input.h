@@ -6,6 +6,7 @@
 #ifndef ASSAY_INPUT_H
 #define ASSAY_INPUT_H
 
+#include "reference/replicates/shared_noise.h"
 #include "tools/compare/compare.h"
 #include "tools/images/image_file.h"
 #include "tools/images/replicate_dir.h"
@@ -27,7 +28,7 @@ enum input_kind {
 
 struct input_options {
     const char *curve; /* of integer images (tone_curve.h); NULL: not known */
-    double spp;        /* samples per pixel of a side whose file does not say; 0: not known */
+    double spp;        /* samples per pixel of a side (of each render) whose file does not say; 0: not known */
     bool packed;       /* leave those of a moments EXR packed (moments.h) */
 };
 
@@ -39,6 +40,9 @@ struct input {
     unsigned char *censored; /* 1 per pixel: not 0 where nothing is known, or NULL */
     double *rounding;        /* 3 per pixel: variance that rounding to a code has added, or NULL */
     size_t num_censored;
+    /* Of INPUT_REPLICATES: shared_noise_factor(), by which input_pair() multiplies the variance; else 0. */
+    double sharing;
+    struct square_noise unlimited; /* squares that show there is no such factor; side 0: there is */
     bool is_guessed; /* by input_pair(): n, unit and spp stand for nothing that was observed */
 };
 
@@ -61,8 +65,9 @@ NODISCARD bool input_take(const struct input_memory *memory, const char *name, c
 void input_free(struct input *in);
 
 /* Prepares both for compare_moments(), packed or not: converts to one colour space, sets censored pixels to 0 without
- * noise in both, bounds skewness where it is not known, and estimates the variance from the images themselves if
- * one of them has none. */
+ * noise in both, bounds skewness where it is not known, allows for noise that pixels of replicates share, and
+ * estimates the variance from the images themselves if one of them has none. Fails on replicates that share noise
+ * over more pixels than can be allowed for. */
 NODISCARD bool input_pair(struct input *a, struct input *b, struct notes *notes, struct err *e);
 
 /* After compare_moments() on a pair: EQUIVALENT and NO DIFFERENCE FOUND become INCONCLUSIVE, with the reason, if more than

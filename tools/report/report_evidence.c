@@ -209,7 +209,9 @@ static void write_statistics(FILE *f, const json_t *claim)
     if (hint != NULL)
         write_hint(f, hint);
     if (ratio != NULL)
-        fprintf(f, "The variance of one path of A is %s times that of B [%s, %s].",
+        fprintf(f, "The variance of one %s of A is %s times that of B [%s, %s].",
+                member_number(claim, "spp_a") > 0 && member_number(claim, "spp_b") > 0 ? "path"
+                                                                                       : "render",
                 html_number(member_number(ratio, "ratio")).s,
                 html_number(member_end(ratio, "ci", 0)).s,
                 html_number(member_end(ratio, "ci", 1)).s);

@@ -190,8 +190,10 @@ static bool run_moments(const struct compare_job *job, struct compared *out, str
     if (!pair_read(job, job->path, job->memory, &p, &out->notes, e))
         return false;
     bool two = job->again[0] != NULL;
-    double seen = variance_ratio_of_difference(&p.in[0].m, &p.in[1].m);
-    if (seen < 1)
+    /* Noise that was taken from A - B says nothing of itself, and what pixels share is in the variances. */
+    double seen = variance_ratio_of_difference(&p.in[0].m, &p.in[1].m) *
+                  fmax(1, fmax(p.in[0].sharing, p.in[1].sharing));
+    if (seen < 1 && !p.in[0].is_guessed)
         input_notes_add(&out->notes,
                         "the sides are not independent, or state too much noise: A - B is %.2g of "
                         "what they state (root mean square). Same seeds? --paired judges them as "
@@ -221,8 +223,8 @@ static bool same_image(const struct replicate_dir *r, const struct replicate_dir
 }
 
 /* Reads a directory of replicates, or borrows those in memory. */
-static bool replicates_read(const char *path, const struct input_memory *memory,
-                            struct replicate_dir *out, struct err *e)
+static bool renders_read(const char *path, const struct input_memory *memory,
+                         struct replicate_dir *out, struct err *e)
 {
     if (memory == NULL)
         return replicate_dir_read(path, out, e);
@@ -232,7 +234,7 @@ static bool replicates_read(const char *path, const struct input_memory *memory,
     return true;
 }
 
-static void replicates_free(const struct input_memory *memory, struct replicate_dir *r)
+static void renders_free(const struct input_memory *memory, struct replicate_dir *r)
 {
     if (memory == NULL)
         replicate_dir_free(r);
@@ -246,11 +248,11 @@ static bool permute_again(const struct compare_job *job, const struct replicate_
     struct permutation found = out->perm;
     bool ok = true;
     for (int i = 0; ok && i < 2; i++)
-        ok = replicates_read(job->again[i], job->memory_again[i], &again[i], e) &&
+        ok = renders_read(job->again[i], job->memory_again[i], &again[i], e) &&
              same_image(&first[i], &again[i], job->again[i], e);
     ok = ok && permutation_confirm(&found, &again[0], &again[1], stage, &out->perm, e);
-    replicates_free(job->memory_again[0], &again[0]);
-    replicates_free(job->memory_again[1], &again[1]);
+    renders_free(job->memory_again[0], &again[0]);
+    renders_free(job->memory_again[1], &again[1]);
     return ok;
 }
 
@@ -262,8 +264,8 @@ static bool run_exchangeable(const struct compare_job *job, struct compared *out
     bool two = job->again[0] != NULL;
     struct permutation_options stage = {two ? two_stage_alpha(opt.alpha) : opt.alpha, job->min_side,
                                         opt.tile};
-    bool ok = replicates_read(job->path[0], job->memory[0], &r[0], e) &&
-              replicates_read(job->path[1], job->memory[1], &r[1], e);
+    bool ok = renders_read(job->path[0], job->memory[0], &r[0], e) &&
+              renders_read(job->path[1], job->memory[1], &r[1], e);
     for (int i = 0; ok && i < 2; i++) {
         ok = replicate_dir_moments(&r[i], &out->m[i], e);
         out->path[i] = job->path[i];
@@ -286,8 +288,8 @@ static bool run_exchangeable(const struct compare_job *job, struct compared *out
             "those of the moments",
             r[0].num, r[1].num, out->perm.smallest_p);
     }
-    replicates_free(job->memory[0], &r[0]);
-    replicates_free(job->memory[1], &r[1]);
+    renders_free(job->memory[0], &r[0]);
+    renders_free(job->memory[1], &r[1]);
     return ok;
 }
 

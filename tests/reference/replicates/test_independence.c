@@ -1,6 +1,6 @@
 /* The test of replicates' independence: its false alarm rate, and that dependent replicates are found. The
  * replicates are drawn here, from the distributions of simulate.h. */
-#include "reference/replicates/independence.h"
+#include "reference/replicates/shared_noise.h"
 #include "tests/support/simulate.h"
 #include "tests/support/test.h"
 
@@ -272,4 +272,79 @@ TEST(a_known_filter_is_allowed_for)
     assert_in_range(failed, 0, 10);
     assert_int_equal(refused, 200);
     assert_true(fabs(ratio / (2.25 * pow(1 - 1.0 / 48, 2)) - 1) < 0.1);
+}
+
+/* The factor of shared_noise_factor(), and whether there is one. */
+static double factor_of(const struct replicates *r, double alpha, bool *limited)
+{
+    struct shared_noise s;
+    struct err e;
+    const struct square_noise *unlimited;
+    MUST(shared_noise_measure(r, &s, &e));
+    assert_int_equal(s.num, 5); /* sides 2 to 32 */
+    double factor = shared_noise_factor(&s, alpha, &unlimited);
+    *limited = unlimited == NULL;
+    return factor;
+}
+
+/* H0: pixels are independent, alpha = 1 %, 400 sets a row: noise is said to be shared in at most Binomial(400, 1 %), more
+ * than 14 with probability 2.5e-5. That it is found where it is shared: the next two tests. */
+TEST(independent_pixels_share_no_noise)
+{
+    static const struct {
+        enum law law;
+        int count;
+    } rows[] = {{LAW_NORMAL, 3}, {LAW_EXPONENTIAL, 3}, {LAW_RARE, 4}, {LAW_BLACK, 8}};
+    uint64_t seed = 20261128;
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        int found = 0;
+        for (int n = 0; n < 400; n++) {
+            bool limited;
+            struct replicates r = draw_all(rows[i].law, rows[i].count, false, &seed);
+            found += factor_of(&r, 0.01, &limited) > 1;
+            replicates_free(&r);
+        }
+        printf("law %d, %d replicates: noise is shared in %d of 400\n", rows[i].law, rows[i].count,
+               found);
+        assert_in_range(found, 0, 14);
+    }
+}
+
+/* The tent's factor is 2.25 (above). 8 replicates have 16 squares of 8 x 8, so 112 degrees of freedom: a standard error
+ * of 13 % of the ratio there and, if the ratio of 4 x 4 were exact, twice that of the extrapolated one, to which three of
+ * them are added: 1.5 of its own, so that 93 of 100 reach 2.25, fewer than 85 with probability 0.2 %. All stay
+ * below 5.5, 4 standard errors above 2.25 + 3 x 0.3. */
+TEST(the_factor_of_a_filter)
+{
+    uint64_t seed = 20261129;
+    int enough = 0;
+    for (int n = 0; n < 100; n++) {
+        bool limited;
+        struct replicates r = splat_all(8, 0, &seed);
+        double factor = factor_of(&r, 1e-6, &limited);
+        assert_true(limited && factor > 1 && factor < 5.5);
+        enough += factor >= 2.25;
+        replicates_free(&r);
+    }
+    printf("a factor of 2.25 is covered in %d of 100\n", enough);
+    assert_true(enough >= 85);
+}
+
+/* Half of each pixel's variance is the same in the whole image: correlation 1/2, so sums over 8 x 8 vary 32.5 times as
+ * much and over 4 x 4 8.5 times, and the next square would vary 1.74 times as much again. No factor is enough. */
+TEST(noise_of_the_whole_image_has_no_factor)
+{
+    uint64_t seed = 20261130;
+    for (int n = 0; n < 50; n++) {
+        bool limited;
+        struct replicates r = draw_all(LAW_NORMAL, 8, false, &seed);
+        for (int k = 0; k < 8; k++) {
+            double all = 0.3 * draw_normal(uniform(&seed), &seed);
+            for (int p = 0; p < PIXELS; p++)
+                r.luminance[k * PIXELS + p] += (float)(all * (1 + p % 7));
+        }
+        factor_of(&r, 1e-6, &limited);
+        assert_false(limited);
+        replicates_free(&r);
+    }
 }

@@ -64,9 +64,9 @@ static bool permutation_part(void *arg, int part, size_t first, size_t end,
         image[k] = pixels[k];
         names[k] = name[k];
     }
-    struct replicate_dir a = {REPLICATES, PERMUTED_SIDE, PERMUTED_SIDE, image, names};
+    struct replicate_dir a = {REPLICATES, PERMUTED_SIDE, PERMUTED_SIDE, image, names, 0};
     struct replicate_dir b = {REPLICATES, PERMUTED_SIDE, PERMUTED_SIDE, image + REPLICATES,
-                              names + REPLICATES};
+                              names + REPLICATES, 0};
     struct permutation_options opt = {.alpha = permutation_level[0][0], .min_side = 2};
     for (size_t i = first; i < end; i++) {
         struct permutation p;

@@ -84,7 +84,104 @@ TEST(test_directory)
     odd_file(test_path("runs/s4.exr"), "no image");
     assert_refused(test_path("runs"), (struct input_options){0}, "s4.exr: cannot read");
     assert_int_equal(unlink(test_path("runs/s4.exr")), 0);
-    assert_refused(test_path("runs"), (struct input_options){.spp = 4}, "--spp-a");
+    input_free(&in);
+    in = read_side(test_path("runs"), (struct input_options){.spp = 4}, &notes);
+    assert_true(in.m.spp == 4);
+}
+
+/* Renders that are moments EXR say how many paths they have: here 5 samples of a path each, and 7 in the last. */
+TEST(renders_state_their_paths)
+{
+    struct err e;
+    struct notes notes = {0};
+    assert_true(fs_make_dirs(test_path("own"), &e));
+    for (int k = 0; k < 3; k++) {
+        OWN(moments) m = new_moments(2, 1, "sample");
+        for (int i = 0; i < (k < 2 ? 5 : 7); i++)
+            for (size_t p = 0; p < 2; p++)
+                moments_add(&m, p, (double[]){1 + k + i, 2, 3});
+        const char name[] = {'o', 'w', 'n', '/', (char)('0' + k), '.', 'e', 'x', 'r', '\0'};
+        MUST(moments_write(test_path(name), &m, NULL, 0, &e));
+    }
+    OWN(input) in = read_side(test_path("own"), (struct input_options){0}, &notes);
+    assert_near(in.m.spp, 17.0 / 3, 1e-6);
+    assert_refused(test_path("own"), (struct input_options){.spp = 4},
+                   "--spp-a: its renders say themselves");
+}
+
+/* `count` renders of 32 x 32 pixels, each the mean of `side` x `side` normal draws of mean 1 that it shares with its
+ * neighbours. */
+static struct replicate_dir shared_renders(int count, int side, uint64_t *seed)
+{
+    enum { SIDE = 32, MOST = 16 };
+    struct replicate_dir r = {.num = count, .width = SIDE, .height = SIDE};
+    r.rgb = calloc((size_t)count, sizeof *r.rgb);
+    r.name = calloc((size_t)count, sizeof *r.name);
+    for (int k = 0; k < count; k++) {
+        static double fine[SIDE + MOST][SIDE + MOST];
+        for (int i = 0; i < (SIDE + MOST) * (SIDE + MOST); i++)
+            fine[i / (SIDE + MOST)][i % (SIDE + MOST)] = 1 + 0.3 * draw_normal(uniform(seed), seed);
+        r.rgb[k] = calloc(3 * SIDE * SIDE, sizeof **r.rgb);
+        for (int p = 0; p < SIDE * SIDE; p++)
+            for (int i = 0; i < side * side; i++)
+                for (int c = 0; c < 3; c++)
+                    r.rgb[k][3 * p + c] +=
+                        (float)(fine[p / SIDE + i / side][p % SIDE + i % side] / (side * side));
+    }
+    return r;
+}
+
+/* Compares two such folders, if they can be; with `naive` as if pixels were independent. */
+static bool compare_shared(int side, bool naive, uint64_t *seed, enum verdict *verdict,
+                           struct err *why)
+{
+    struct notes notes = {0};
+    struct err e;
+    struct input in[2];
+    for (int i = 0; i < 2; i++) {
+        struct replicate_dir r = shared_renders(8, side, seed);
+        const struct input_memory memory = {.renders = r, .type = IMAGE_FLOAT};
+        MUST(input_take(
+            &memory, "renders", "ab" [i], &(struct input_options) { 0 }, &in[i], &notes, &e));
+        if (naive)
+            in[i].sharing = 0;
+        replicate_dir_free(&r);
+    }
+    struct comparison c;
+    const struct compare_options opt = {.alpha = 0.05, .tile = 16, .threads = 1};
+    bool ok = input_pair(&in[0], &in[1], &notes, why) &&
+              compare_moments(&in[0].m, &in[1].m, &opt, &c, why);
+    if (ok) {
+        assert_int_equal(has_note(&notes, "share noise, as by a pixel filter"), !naive);
+        assert_false(c.variance.valid && !naive); /* no interval without independent pixels */
+        *verdict = c.verdict;
+        comparison_free(&c);
+    }
+    input_free(&in[0]);
+    input_free(&in[1]);
+    return ok;
+}
+
+/* H0: two folders of 8 equal renders under a box filter of two pixels, alpha 5 %: at most Binomial(60, 5 %) are
+ * DIFFERENT, more than 10 with a probability of 2e-4. Control: with pixels taken for independent, sums have half their
+ * standard error, and more than half of 20 pairs are. Renders smoothed over a quarter of the image are refused. */
+TEST(replicates_that_share_noise)
+{
+    uint64_t seed = 41;
+    struct err e;
+    int different[2] = {0};
+    for (int naive = 0; naive < 2; naive++)
+        for (int i = 0; i < (naive ? 20 : 60); i++) {
+            enum verdict v = VERDICT_INCONCLUSIVE;
+            MUST(compare_shared(2, naive, &seed, &v, &e));
+            different[naive] += v == VERDICT_DIFFERENT;
+        }
+    printf("shared noise: DIFFERENT in %d of 60, and in %d of 20 as if independent\n", different[0],
+           different[1]);
+    assert_in_range(different[0], 0, 10);
+    assert_in_range(different[1], 11, 20);
+    enum verdict v = VERDICT_INCONCLUSIVE;
+    REFUSES(compare_shared(16, false, &seed, &v, &e), "--exchangeable compares whole images");
 }
 
 /* 1 x 1 pixel, n = 100. X: E[x] = 2, E[x^2] = 5: variance 1 of one sample with n below, M2 = 100.

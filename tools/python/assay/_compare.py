@@ -164,7 +164,8 @@ def compare(a, b, *, margin=None, margin_tile=None, margin_variance=None, accept
     exchangeable: exact test by permutation of replicates
     same_program: exact test of "nothing changed" between two versions with equally many samples; filter_width: pixels
       nearer than this may share noise (0: it is measured)
-    curve: of integer images: "srgb", "linear", "gamma=2.2", "cgl"; spp_a, spp_b: of files with a variance only
+    curve: of integer images: "srgb", "linear", "gamma=2.2", "cgl"
+    spp_a, spp_b: samples per pixel of a file with a variance only, or of each replicate: variances are then of one path
     """
     options = Options()
     lib.assay_options_init(options, c.sizeof(options))

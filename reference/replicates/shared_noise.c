@@ -1,0 +1,136 @@
+#include "shared_noise.h"
+
+#include <assert.h>
+#include <gsl/gsl_cdf.h>
+#include <math.h>
+#include <stdlib.h>
+
+static const double fewest_dof = 100; /* to know a variance to 14 % */
+static const double most_growth =
+    1.5; /* of a ratio beyond the largest squares; 1.75 if all pixels share */
+
+/* Sums of residuals over squares: num planes of nx x ny, and the noisy pixels in each square. */
+struct level {
+    int nx, ny, num;
+    double *sum, *pixels;
+};
+
+/* Sums the residuals of 2 x 2 pixels; e has room for one pixel's. */
+static void sum_pixels(const struct replicates *r, double *e, struct level *l)
+{
+    const size_t squares = (size_t)l->nx * (size_t)l->ny;
+    for (int y = 0; y < r->height; y++)
+        for (int x = 0; x < r->width; x++) {
+            if (!replicates_residuals(r, (size_t)y * (size_t)r->width + (size_t)x, e))
+                continue;
+            const size_t i = (size_t)(y / 2) * (size_t)l->nx + (size_t)(x / 2);
+            l->pixels[i]++;
+            for (int k = 0; k < r->num; k++)
+                l->sum[(size_t)k * squares + i] += e[k];
+        }
+}
+
+/* Sums 2 x 2 squares of one plane, in place. */
+static void halve(double *plane, int nx, int ny)
+{
+    size_t to = 0;
+    for (int y = 0; y < ny; y += 2)
+        for (int x = 0; x < nx; x += 2) {
+            double sum = 0;
+            for (int i = 0; i < 4; i++)
+                if (x + i % 2 < nx && y + i / 2 < ny)
+                    sum += plane[(size_t)(y + i / 2) * (size_t)nx + (size_t)(x + i % 2)];
+            plane[to++] = sum;
+        }
+}
+
+static void coarsen(struct level *l)
+{
+    const size_t stride = (size_t)l->nx * (size_t)l->ny;
+    const int nx = (l->nx + 1) / 2, ny = (l->ny + 1) / 2;
+    halve(l->pixels, l->nx, l->ny);
+    for (int k = 0; k < l->num; k++) {
+        double *plane = l->sum + (size_t)k * stride,
+               *to = l->sum + (size_t)k * (size_t)nx * (size_t)ny;
+        halve(plane, l->nx, l->ny);
+        for (size_t i = 0; i < (size_t)nx * (size_t)ny; i++)
+            to[i] = plane[i];
+    }
+    l->nx = nx;
+    l->ny = ny;
+}
+
+/* Pairs of pixels p, q in one square: C = sum over k of e_k(p) e_k(q) has the mean 0 and, over permutations of one
+ * against the other, the variance K - 1; different pairs are uncorrelated. */
+static struct square_noise measure(const struct level *l, int side)
+{
+    const size_t squares = (size_t)l->nx * (size_t)l->ny;
+    double products = 0, pairs = 0, pixels = 0, noisy = 0, freedom = l->num - 1;
+    for (size_t i = 0; i < squares; i++) {
+        double n = l->pixels[i], square = 0;
+        for (int k = 0; k < l->num; k++)
+            square += l->sum[(size_t)k * squares + i] * l->sum[(size_t)k * squares + i];
+        products += (square - n * freedom) / 2;
+        pairs += n * (n - 1) / 2;
+        pixels += n;
+        noisy += n > 0;
+    }
+    struct square_noise s = {.side = side, .ratio = 1, .dof = noisy * freedom};
+    if (!(pairs > 0))
+        return s;
+    s.r = products / pairs / freedom;
+    s.se = 1 / sqrt(pairs * freedom);
+    s.ratio = 1 + 2 * products / (pixels * freedom);
+    double x = s.dof + s.r / s.se * sqrt(2 * s.dof);
+    s.log10_p = x > 0 ? log10(fmax(1e-300, gsl_cdf_chisq_Q(x, s.dof))) : 0;
+    return s;
+}
+
+bool shared_noise_measure(const struct replicates *r, struct shared_noise *out, struct err *e)
+{
+    assert(r->num >= 3);
+    *out = (struct shared_noise){.num = 0};
+    struct level l = {.nx = (r->width + 1) / 2, .ny = (r->height + 1) / 2, .num = r->num};
+    const size_t squares = (size_t)l.nx * (size_t)l.ny, k = (size_t)r->num;
+    l.sum = calloc((k + 1) * squares + k, sizeof *l.sum);
+    if (l.sum == NULL)
+        return err_set(e, "noise that pixels share: out of memory");
+    l.pixels = l.sum + k * squares;
+    sum_pixels(r, l.pixels + squares, &l);
+    for (int side = 2;; side *= 2) {
+        out->square[out->num++] = measure(&l, side);
+        if (l.nx == 1 && l.ny == 1)
+            break;
+        coarsen(&l);
+    }
+    free(l.sum);
+    return true;
+}
+
+double shared_noise_factor(const struct shared_noise *s, double alpha,
+                           const struct square_noise **unlimited)
+{
+    const double level = log10(alpha / (s->num > 0 ? s->num : 1));
+    const struct square_noise *shown = NULL, *largest = NULL;
+    double before = 1;
+    *unlimited = NULL;
+    for (const struct square_noise *q = s->square; q < s->square + s->num; q++) {
+        if (q->log10_p <= level)
+            shown = q;
+        if (q->dof >= fewest_dof || largest == NULL) {
+            before = largest != NULL ? largest->ratio : 1;
+            largest = q;
+        }
+    }
+    if (shown == NULL)
+        return 1;
+    double limit = 2 * largest->ratio - before;
+    double factor = fmax(limit, largest->ratio) + 3 * largest->ratio * sqrt(2 / largest->dof);
+    if (limit > most_growth * largest->ratio)
+        *unlimited = largest;
+    /* What the largest squares would show if that were all; as sharing is shown, sqrt(alpha) is rare enough. */
+    for (const struct square_noise *q = largest + 1; q < s->square + s->num; q++)
+        if (log10(fmax(1e-300, gsl_cdf_chisq_Q(q->dof * q->ratio / factor, q->dof))) <= level / 2)
+            *unlimited = q;
+    return factor;
+}

@@ -1,0 +1,38 @@
+/* How much of their noise do the pixels of a render share? Samples that reach several pixels (a reconstruction
+ * filter wider than one), a denoiser or a photon map make the noise of neighbours alike: sums over squares then vary
+ * more than sums of independent pixels, and every interval that takes pixels for independent is too narrow.
+ *
+ * With e[k](p) as in independence.h: for a square of n noisy pixels, sum over k of (sum over p of e[k](p))^2 is n (K - 1)
+ * on average if its pixels are independent, whatever the law. */
+#ifndef ASSAY_SHARED_NOISE_H
+#define ASSAY_SHARED_NOISE_H
+
+#include "independence.h"
+
+enum { MOST_SQUARE_SIZES = 24 };
+/* Squares of one side that cut up the image. */
+struct square_noise {
+    int side; /* 2, 4, 8, .. until one square is the image */
+    double r, se; /* the mean correlation of two pixels in one square; its standard error if independent */
+    double ratio;   /* the variance of a square's sum over the sum of its pixels' variances */
+    double dof;     /* of that variance: K - 1 a square */
+    double log10_p; /* of as large a ratio if pixels are independent: chi-square, about */
+};
+struct shared_noise {
+    int num;
+    struct square_noise square[MOST_SQUARE_SIZES];
+};
+
+/* At least 3 replicates. False only out of memory. */
+NODISCARD bool shared_noise_measure(const struct replicates *r, struct shared_noise *out,
+                                    struct err *e);
+
+/* By how much the variance of large sums exceeds that of independent pixels; 1 unless a size of squares shows more
+ * with a p of at most alpha over their number. It is extrapolated from the largest squares of which there are enough (a
+ * fixed reach leaves out a part of the sum that falls as 1/side), plus three standard errors of their ratio.
+ * *unlimited: NULL or, where no such factor is known, the size of squares that shows it: there the ratio still grows
+ * too fast, or the largest squares exceed it. The whole image shares noise then, or there are too few pixels. */
+double shared_noise_factor(const struct shared_noise *s, double alpha,
+                           const struct square_noise **unlimited);
+
+#endif
