@@ -55,7 +55,8 @@ struct variance_ratio {
 extern const char *const statistic_name[NUM_STATISTICS]; /* "image", "pyramid", .. */
 
 /* A square region (or the image) in one channel (0..2 RGB, 3 luminance .2126 .7152 .0722). Relative
- * quantities are in units of the larger of mean_b and 5 % of the mean luminance of the image B.
+ * quantities are in units of the larger of mean_b and 5 % of the mean luminance of the image B, in which no pixel counts
+ * as more than ten times that mean.
  * Every number is finite: t is within +-1e9, log10_p at least -1e6, mdb at most 1e6. */
 struct region {
     int x, y, width, height;
@@ -68,6 +69,9 @@ struct region {
     double log10_p;        /* two-sided p of "no difference beyond the margin" */
     double ci_lo, ci_hi;   /* 1 - 2 alpha interval of `difference`, widened for skew */
     bool ci_valid;         /* false: too skewed for an interval; ci_lo, ci_hi only a hint */
+    /* About how many times the samples would make skewness, which falls as 1/sqrt n, no hindrance to an interval and to
+     * a test; 1: it is none. */
+    double unskew_interval, unskew_test;
     double mdb;            /* the smallest true |difference| that comes out DIFFERENT with 95 % */
     double margin;
 };

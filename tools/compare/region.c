@@ -310,6 +310,14 @@ static bool half_width(const struct judge *j, const struct measured *m, double *
            m->dof >= least_dof;
 }
 
+/* About how many times the samples would bring the skewness factor at x well within `limit`, to half of it, and |g| x within
+ * half of gx. */
+static double samples_for(double skew, double x, double limit, double gx)
+{
+    double beyond = fmax(skew_factor(skew, x) / limit, skew * x / gx);
+    return beyond > 1 ? 4 * beyond * beyond : 1;
+}
+
 void region_name(int width, int height, struct rect r, int channel, char *text, size_t size)
 {
     if (r.width == width && r.height == height)
@@ -340,10 +348,16 @@ struct region region_fill(const struct judge *j, const struct cell *cell, struct
         .ci_valid = true,
         .margin = m.margin,
     };
+    out.unskew_interval = out.unskew_test = 1;
     if (!m.noise_free) {
         double x;
         out.ci_valid = half_width(j, &m, &x);
         half += x * sqrt(m.v_margin);
+        /* The factor at the widened quantile, from which the search for it leaves. */
+        out.unskew_interval = samples_for(m.skew, stats_normal_quantile(j->opt.alpha * exp(-1)),
+                                          skew_limit_widened, INFINITY);
+        out.unskew_test =
+            samples_for(m.skew, j->z_guard[m.statistic], skew_limit_raised, largest_gx);
     }
     out.ci_lo = (m.d - half) / m.unit;
     out.ci_hi = (m.d + half) / m.unit;

@@ -29,7 +29,8 @@ static void place(const struct comparison *c, const struct region *r, char *text
 static double factor_needed(const struct region *r, size_t num_intervals)
 {
     if (!r->ci_valid)
-        return 4; /* the factor on p is above e: with four times the samples, above sqrt e */
+        return fmax(4,
+                    r->unskew_interval); /* 4: few degrees of freedom may be in the way instead */
     double half = (r->ci_hi - r->ci_lo) / 2;
     double spare = stats_normal_quantile(0.025 / (double)num_intervals) * r->std_error;
     double planned = pow((half + spare) / r->margin, 2);
@@ -82,7 +83,8 @@ static void judge_search(struct comparison *c)
     char image[32], tile[32];
     if (c->mdb_global >= region_mdb_none) {
         c->verdict = VERDICT_INCONCLUSIVE;
-        c->extra_factor = 4;
+        c->extra_factor =
+            fmin(verdict_largest_factor, fmax(4, c->global[CHANNEL_LUMINANCE].unskew_test));
         snprintf(c->reason, sizeof c->reason,
                  "the image: samples too skewed for a test, more of them are needed");
         return;

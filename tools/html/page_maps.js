@@ -10,16 +10,25 @@ const LUMINANCE = [0.2126, 0.7152, 0.0722];
 const luminance = (three, i) =>
   LUMINANCE[0] * three[0][i] + LUMINANCE[1] * three[1][i] + LUMINANCE[2] * three[2][i];
 
-// The image's luminance, its standard error (channels taken as fully correlated), and its mean.
+// The mean, in which no value counts as more than ten times it: a lamp in view is no unit of what it shines upon.
+function meanWithoutLamps(value) {
+  let last = Infinity, mean = value.reduce((sum, v) => sum + v, 0) / value.length;
+  while (mean < 0.99 * last) {
+    last = mean;
+    mean = value.reduce((sum, v) => sum + Math.min(v, 10 * last), 0) / value.length;
+  }
+  return mean;
+}
+
+// The image's luminance, its standard error (channels taken as fully correlated), and the least unit of differences.
 function greyOf(layer) {
   if (!layer.grey) {
     const pixels = layer.width * layer.height, value = new Float64Array(pixels), error = new Float64Array(pixels);
-    let sum = 0;
     for (let i = 0; i < pixels; i++) {
-      sum += value[i] = luminance(layer.value, i);
+      value[i] = luminance(layer.value, i);
       error[i] = luminance(layer.error, i);
     }
-    layer.grey = { value, error, mean: sum / pixels };
+    layer.grey = { value, error, floor: 0.05 * meanWithoutLamps(value) };
   }
   return layer.grey;
 }
@@ -87,7 +96,7 @@ function reduceLayer(layer, width, height) {
 // Differences are in units of B, or of 5 % of its mean where it is darker than that.
 const makeMap = {
   difference(a, b) {
-    const p = greyOf(a), q = greyOf(b), floor = 0.05 * q.mean;
+    const p = greyOf(a), q = greyOf(b), floor = q.floor;
     return p.value.map((v, i) => (v - q.value[i]) / Math.max(q.value[i], floor));
   },
   t(a, b) {
@@ -96,7 +105,7 @@ const makeMap = {
   },
   // RMS difference over 5 x 5 pixels, less the mean square that noise alone explains; relative as above.
   error(a, b) {
-    const p = greyOf(a), q = greyOf(b), floor = 0.05 * q.mean;
+    const p = greyOf(a), q = greyOf(b), floor = q.floor;
     const left = p.value.map((v, i) => (v - q.value[i]) ** 2 - p.error[i] ** 2 - q.error[i] ** 2);
     const sum = boxSum(left, a.width, a.height, 2), unit = boxSum(q.value, a.width, a.height, 2);
     const count = boxSum(new Float64Array(left.length).fill(1), a.width, a.height, 2);

@@ -10,7 +10,7 @@ function readPixel(scene) {
     ...[0, 1, 2].map((k) => withError(layer.value[k][i], layer.error[k][i])),
     layer.unit === "exact" ? "exact" : digits(countAt(layer, i), 7)]));
   const pairs = scene.claims.map((c) => {
-    const p = greyOf(c.a.layer), q = greyOf(c.b.layer), unit = Math.max(q.value[i], 0.05 * q.mean);
+    const p = greyOf(c.a.layer), q = greyOf(c.b.layer), unit = Math.max(q.value[i], q.floor);
     const d = p.value[i] - q.value[i], e = Math.hypot(p.error[i], q.error[i]);
     return row(c.name, [withError(100 * d / unit, 100 * e / unit) + " %", digits(studentT(d, e))]);
   });
@@ -44,6 +44,6 @@ function tileDifference(scene, tile, claim) {
       sa += a.value[y * scene.width + x];
       sb += b.value[y * scene.width + x];
     }
-  const pixels = (right - tile.x) * (bottom - tile.y), d = (sa - sb) / pixels / Math.max(sb / pixels, 0.05 * b.mean);
+  const pixels = (right - tile.x) * (bottom - tile.y), d = (sa - sb) / pixels / Math.max(sb / pixels, b.floor);
   return "difference " + (d > 0 ? "+" : "") + percent(d);
 }

@@ -505,6 +505,37 @@ TEST(test_all_alike_by_luck)
     assert_int_equal(alarms, 0);
 }
 
+/* The image's |g| is 0.156: 64 pixels of k3 = 1.25 v^1.5. With x = 3.375, the quantile of 1e-3/e, the factor g x^3/3 is 2.
+ * It falls as 1/sqrt n: with 16 times the samples it is 1/2, half of what an interval may be widened by. */
+TEST(test_samples_that_skewness_needs)
+{
+    OWN(moments) a = new_moments(8, 8, "sample"), b = new_moments(8, 8, "exact");
+    const double n = 1000, v = 1e-6;
+    constant(&b, 1, 1);
+    set_all(&a, n, 1, v * n * (n - 1), 1.25 * v * sqrt(v) * n * (n - 1) * (n - 2));
+    OWN(comparison) c = compare(&a, &b, (struct compare_options){1e-3, 0.01, 0.02, 8, 0, 1});
+    assert_int_equal(c.verdict, VERDICT_INCONCLUSIVE);
+    assert_near(c.extra_factor, 16, 0.2);
+}
+
+/* A lamp in view, 1000 in 16 of 1024 pixels, and walls of 0.1, 30 % too bright in A. In units of 5 % of the mean, 0.79,
+ * they would be 3.8 % off, within 8 %; of what counts as at most ten times the mean they are 30 % off. Control: where a
+ * quarter of the image is the lamp, its walls are what does not matter. */
+TEST(test_lamp_in_view)
+{
+    for (int side = 4; side <= 16; side += 12) {
+        OWN(moments) a = new_moments(32, 32, "exact"), b = new_moments(32, 32, "exact");
+        constant(&a, 0.13, 1);
+        constant(&b, 0.1, 1);
+        for (int i = 0; i < 3 * side * side; i++) {
+            size_t at = (size_t)(i / (3 * side) * 3 * 32 + i % (3 * side));
+            a.mean[at] = b.mean[at] = 1000;
+        }
+        enum verdict v = verdict_of(&a, &b, (struct compare_options){1e-3, 0.02, 0.08, 8, 0, 1});
+        assert_int_equal(v, side == 4 ? VERDICT_DIFFERENT : VERDICT_EQUIVALENT);
+    }
+}
+
 /* A tile that is too skewed is judged within what is around it: its MDB is that of the image times
  * their ratio of radiance. And a moderately skewed interval is widened, never narrowed. */
 TEST(test_skewed_tile)
