@@ -185,9 +185,10 @@ static bool run_all(struct engine_job *j, struct moments *out, struct err *e)
         ok = ok && fold_runs(j, &m, e);
         /* The variance of a sum over pixels that share samples exceeds the sum of their variances, which is inflated to
          * match. */
-        if (ok && j->en->shares_samples && strcmp(m.unit, "replicate") == 0)
-            multiply(&m, 1, pixel_filter_sharing(&j->en->filter, 2),
-                     pixel_filter_sharing(&j->en->filter, 3));
+        if (ok && j->en->shares_samples && strcmp(m.unit, "replicate") == 0) {
+            m.sharing = pixel_filter_sharing(&j->en->filter, 2);
+            multiply(&m, 1, m.sharing, pixel_filter_sharing(&j->en->filter, 3));
+        }
     }
     if (ok)
         *out = m;

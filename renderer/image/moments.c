@@ -73,6 +73,7 @@ bool moments_copy(const struct moments *from, struct moments *to, struct err *e)
     memcpy(to->m3, from->m3, 3 * pixels * sizeof *to->m3);
     memcpy(to->unit, from->unit, sizeof to->unit);
     to->spp = from->spp;
+    to->sharing = from->sharing;
     return true;
 }
 
@@ -105,6 +106,8 @@ bool moments_merge(struct moments *dst, const struct moments *src, struct err *e
     if (strcmp(dst->unit, src->unit) != 0 || dst->spp != src->spp)
         return err_set(e, "cannot merge moments over a %s of %g spp and a %s of %g spp", dst->unit,
                        dst->spp, src->unit, src->spp);
+    if (dst->sharing != src->sharing)
+        return err_set(e, "cannot merge moments whose pixels share noise in different ways");
     if (dst->tolerance != NULL || src->tolerance != NULL)
         return err_set(e, "cannot merge moments of rounded numbers");
     size_t pixels = (size_t)dst->width * (size_t)dst->height;
@@ -186,7 +189,7 @@ static bool writer_head(struct moments_writer *w, const struct moments *m, int h
                         struct err *e)
 {
     const char *names[IMAGE_MAX_CHANNELS];
-    char spp[32];
+    char spp[32], sharing[32];
     int more = layers != NULL ? layers->channels : 0;
     assert(10 + more <= IMAGE_MAX_CHANNELS);
     memcpy(names, channel_names, sizeof channel_names);
@@ -196,6 +199,8 @@ static bool writer_head(struct moments_writer *w, const struct moments *m, int h
     bool ok = image_head(&w->head, m->width, height, 10 + more, names, e) &&
               image_set_attr(&w->head, "assay:unit", m->unit, e) &&
               image_set_attr(&w->head, "assay:spp", spp, e);
+    snprintf(sharing, sizeof sharing, "%.17g", m->sharing);
+    ok = ok && (!(m->sharing > 1) || image_set_attr(&w->head, "assay:sharing", sharing, e));
     for (int i = 0; ok && i < num_attrs; i++)
         ok = image_set_attr(&w->head, attrs[i].name, attrs[i].value, e);
     return ok;
@@ -325,8 +330,14 @@ static bool read_head(const char *path, struct image_reader *r, struct moments *
     *m = empty(head->width, head->height);
     strcpy(m->unit, unit);
     m->spp = strtod(spp, &end);
-    return !(end == spp || *end != '\0' || !(m->spp >= 0 && m->spp < 1e15)) ||
-           err_set(e, "%s: assay:spp '%s' is not a number of samples", path, spp);
+    if (end == spp || *end != '\0' || !(m->spp >= 0 && m->spp < 1e15))
+        return err_set(e, "%s: assay:spp '%s' is not a number of samples", path, spp);
+    const char *sharing = image_get_attr(head, "assay:sharing");
+    if (sharing == NULL)
+        return true;
+    m->sharing = strtod(sharing, &end);
+    return (end != sharing && *end == '\0' && m->sharing >= 1 && m->sharing < 1e15) ||
+           err_set(e, "%s: assay:sharing '%s' is not a factor of 1 or more", path, sharing);
 }
 
 /* Checks and stores row y. row: its values, channel after channel. */

@@ -24,7 +24,7 @@ struct moments {
      * file; moments_merge() refuses it. */
     double *tolerance;
     /* Of replicates whose pixels share noise: by how much M2 is larger than that of a pixel, so that it is right for sums
-     * of many (reference/replicates/shared_noise.h). 0: they share none. Never stored in a file. */
+     * of many (reference/replicates/shared_noise.h). 0: they share none. */
     double sharing;
     /* The same as float32, in half the memory; n to m3 are then NULL. Only for comparisons, which read by
      * moments_n() to moments_m3(), moments_run() or moments_unpack(). */
@@ -62,7 +62,7 @@ void moments_add(struct moments *m, size_t pixel, const double x[3]);
 /* Adds one observation of every pixel: a whole replicate (RGB, 3 floats a pixel). */
 void moments_add_image(struct moments *m, const float *pixels_rgb);
 /* dst += src, as if all observations had been added to dst [Pebay08 eq. 2.1]. Fails on different sizes,
- * units or spp, and on a tolerance. */
+ * units, spp or sharing, and on a tolerance. */
 NODISCARD bool moments_merge(struct moments *dst, const struct moments *src, struct err *e);
 /* A view of pixels first .. first+num-1, in the order of rows, as an image one pixel high for
  * moments_merge(). Owns nothing. */
@@ -76,7 +76,7 @@ bool moments_noise_is_unknown(const struct moments *m);
 double moments_var_of_mean(const struct moments *m, size_t pixel, int channel);
 
 /* A moments EXR: channels R G B (the mean), M2.R M2.G M2.B, M3.R M3.G M3.B, n; text attributes
- * "assay:unit", "assay:spp" and those given (tools/docs/formats/moments-exr.md). float32. */
+ * "assay:unit", "assay:spp", "assay:sharing" where there is any, and those given (tools/docs/formats/moments-exr.md). float32. */
 NODISCARD bool moments_write(const char *path, const struct moments *m,
                              const struct image_attr *attrs, int num_attrs, struct err *e);
 /* The same with the channels of `layers` (same size; NULL: none) after those. */

@@ -111,15 +111,17 @@ static bool is_far_longer(const struct moments *b, double observed_b, const stru
     return strcmp(a->unit, b->unit) == 0 && observed_b >= far_longer * observed_a;
 }
 
-/* Shares of alpha. The share of a statistic that does not apply goes to the others in proportion.
+/* Shares of alpha. The share of a statistic that does not apply goes to the others in proportion. What compares a pixel
+ * with those around it does not apply where these share its noise.
  * This depends on options and the kind of input only: if it depended on the data, the data would
  * choose among tests. */
 static void set_shares(const struct moments *a, const struct moments *b, struct judge *j)
 {
     static const double part[NUM_STATISTICS] = {.25, .40, .10, .15, .10};
     bool pixels = j->width * j->height > 1, noise_a = !moments_is_exact(a);
-    bool noise_b = !moments_is_exact(b),
-         known = !moments_noise_is_unknown(a) && !moments_noise_is_unknown(b);
+    bool noise_b = !moments_is_exact(b), known = !moments_noise_is_unknown(a) &&
+                                                 !moments_noise_is_unknown(b) &&
+                                                 !(a->sharing > 1) && !(b->sharing > 1);
     bool applies[NUM_STATISTICS] = {
         [STATISTIC_IMAGE] = true,
         [STATISTIC_PYRAMID] = pixels,

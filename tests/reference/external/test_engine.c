@@ -452,6 +452,7 @@ TEST(pixels_that_share_samples_count_as_noisier)
         write_replicates(K);
         engine_of_script("cp {here}/picture_$3.pfm $2 && grep -q triangle $1", more[i], &en);
         OWN(moments) m = must_render(&en, K);
+        assert_true(fabs(m.sharing - (i == 0 ? 2.25 : 0)) < 1e-5);
         for (int p = 0; p < PIXELS; p++) {
             double x = p + 1, m2 = (i == 0 ? 2.25 : 1) * 26 / 3 * x * x;
             assert_true(fabs(m.mean[3 * p] - 8 * x / 3) < 1e-6 * x);

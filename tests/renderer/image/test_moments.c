@@ -88,10 +88,11 @@ TEST(write_and_read)
             moments_add(&m, p, (double[3]){observation(i, 0) + (double)p, 1, observation(i, 2)});
     strcpy(m.unit, "replicate");
     m.spp = 256;
+    m.sharing = 2.25;
     const struct image_attr attr = {"assay:seed", "17"};
     MUST(moments_write(path, &m, &attr, 1, &e) && moments_read(path, &back, &im, &e));
     assert_string_equal(back.unit, "replicate");
-    assert_true(back.spp == 256 && back.width == 3 && back.height == 2);
+    assert_true(back.spp == 256 && back.sharing == 2.25 && back.width == 3 && back.height == 2);
     assert_string_equal(image_get_attr(&im, "assay:seed"), "17");
     for (size_t p = 0; p < 6; p++) {
         assert_true(back.n[p] == m.n[p]);
@@ -260,6 +261,10 @@ TEST(what_cannot_be_moments)
     strcpy(b.unit, a.unit);
     b.spp = 2;
     REFUSES(moments_merge(&a, &b, &e), "of 1 spp and a sample of 2 spp");
+    b.spp = 1;
+    b.sharing = 2;
+    REFUSES(moments_merge(&a, &b, &e), "share noise in different ways");
+    b.sharing = 0;
     moments_free(&a);
     moments_free(&b);
 }
