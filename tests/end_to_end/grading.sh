@@ -159,6 +159,12 @@ check "one image for two scenes is judged" one 2.00
 cp "$tmp/same/12_point_plane.png" "$tmp/same/11_furnace.png"
 check "one image for three scenes has no points" one 0.00
 check "and is told so" grep -q "the same image was handed in for 2 other scenes" "$tmp/one-image/same/grade.json"
+expect "images alone are staff's to look at" 2 "need you" "$build/assay" grade -o "$tmp/one-image" "$tmp/one.rubric" "$tmp/same"
+check "with the reason" grep -q '"flag": "images were handed in, and no program' "$tmp/one-image/same/grade.json"
+check "which the student does not read" bash -c "! grep -q 'allow images' '$tmp/one-image/same/index.html' '$tmp/one-image/same/results.json'"
+sed 's/^total/allow images\n&/' "$tmp/one.rubric" >"$tmp/allowed.rubric"
+rm "$tmp/same/11_furnace.png" && "$build/pathtracer" -q -r 32 32 -s 16 -m 1 -f "$tmp/same/11_furnace.png" reference/scenes/11_furnace.dae >/dev/null
+check "unless they are allowed" "$build/assay" grade -q -o "$tmp/allowed" "$tmp/allowed.rubric" "$tmp/same"
 # Three variants of a scene, by the colour of the lamp. Images made beforehand of the second have all points there (control), and none in
 # another; a right program has all in each. What was drawn stays.
 for k in 1 2 3; do sed "s/10 10 10/$((4 + 3 * k)) 10 $((16 - 3 * k))/" reference/scenes/41_cornell.dae >"$tmp/walls_$k.dae"; done

@@ -166,6 +166,11 @@ static bool grade_made(const struct grade_job *job, struct submission *s, const 
     ok = ok && collect_images(&c, h, e);
     json_object_set_new(grade, "state", json_string(submission_state_name[s->state]));
     json_object_set_new(grade, "wrong", s->why[0] != '\0' ? json_string(s->why) : json_null());
+    if (s->kind == SUBMISSION_IMAGES && !job->rubric->images)
+        json_object_set_new(
+            grade, "flag",
+            json_string("images were handed in, and no program that makes them: nobody knows whose "
+                        "they are ('allow images' in the rubric, if they are what it asks for)"));
     ok = ok && add_checks(&c, h, grade, &mistake, e);
     json_object_set_new(grade, "diagnosis",
                         ok && mistake.judged

@@ -50,6 +50,8 @@ bool grade_needs(const json_t *grade, char *text, size_t size)
     text[0] = '\0';
     if (state != NULL || why != NULL)
         text_append(text, size, "%s", why != NULL ? why : state);
+    if (member_text(grade, "flag") != NULL)
+        text_append(text, size, "%s%s", text[0] != '\0' ? "; " : "", member_text(grade, "flag"));
     json_each(c, json_object_get(grade, "checks")) {
         const char *name = member_or_empty(c, "name"), *flag = member_or_empty(c, "flag");
         const char *const what[] = {flag[0] != '\0' ? flag : NULL,

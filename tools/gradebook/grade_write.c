@@ -165,8 +165,9 @@ static void write_csv(FILE *f, const json_t *grades)
     json_each(g, grades) {
         csv_text(f, member_or_empty(g, "id"));
         fprintf(f, ",%.2f,%g,", member_number(g, "points"), member_number(g, "of"));
-        csv_text(f, member_or_empty(g, "trouble")[0] != '\0' ? member_or_empty(g, "trouble")
-                                                             : member_or_empty(g, "wrong"));
+        csv_text(f, member_or_empty(g, member_text(g, "trouble") != NULL ? "trouble"
+                                       : member_text(g, "wrong") != NULL ? "wrong"
+                                                                         : "flag"));
         json_each(c, json_object_get(g, "checks"))
             fprintf(f, ",%.2f", member_number(c, "points"));
         fputs("\r\n", f);

@@ -164,6 +164,14 @@ static void read_budget(struct statement *s)
     }
 }
 
+static void read_allow(struct statement *s)
+{
+    const char *what = take_word(s);
+    s->r->images = strcmp(what, "images") == 0;
+    if (!s->r->images)
+        rubric_mistake(s->m, s->line, "'allow %.100s': only images can be allowed", what);
+}
+
 static void read_mask(struct statement *s)
 {
     for (int i = 0; i < 4; i++)
@@ -371,6 +379,7 @@ static const struct member of_rubric[] = {{"rubric", TEXT, TO(rubric, title)},
                                           {"limit", .read = read_limit, .many = true},
                                           {"budget", .read = read_budget},
                                           {"mask", .read = read_mask},
+                                          {"allow", .read = read_allow},
                                           {"picture", .read = read_picture, .many = true},
                                           {"part", .read = read_part, .many = true},
                                           {"check", .read = read_check, .many = true},

@@ -42,7 +42,8 @@ extern const char *const rubric_reference_names[]; /* "none", "truth", ... */
 struct accepted {
     int line;
     char name[48];
-    char how[256]; /* options of our renderer (of an image: if they begin with -), or a moments file */
+    char how
+        [256]; /* options of our renderer (of an image: if they begin with -), or a moments file */
 };
 
 /* A set of accepted deviations that a program may have all at once. The first set is empty. */
@@ -107,6 +108,7 @@ struct rubric {
     struct rubric_image image[RUBRIC_IMAGES];
     struct rubric_check check[RUBRIC_CHECKS];
     int num_parts, num_images, num_checks;
+    bool images;           /* what is handed in may be images alone */
     int variants, variant; /* how many there are, and which one this is, from 1; 0: none */
     int old_word_line;     /* the first that says "picture" for "image"; 0: none */
 };

@@ -209,7 +209,11 @@ static enum submission_kind kind_of(const struct rubric *r, struct submission *s
     char path[MAX_PATH];
     snprintf(s->program, sizeof s->program, "./%.150s",
              is_directory || is_archive ? r->program : fs_base(s->path));
-    for (int i = 0; is_directory && i < r->num_images; i++)
+    /* Images beside a program show what it can do; they are not what is graded. */
+    bool runs = has(s, r->program) ||
+                (r->build[0] != '\0' &&
+                 (has(s, "CMakeLists.txt") || has(s, "Makefile") || has(s, fs_base(r->program))));
+    for (int i = 0; is_directory && (r->images || !runs) && i < r->num_images; i++)
         if (find_image(s, r->image[i].name, NULL, path, sizeof path))
             return SUBMISSION_IMAGES;
     if (r->build[0] == '\0' || !(is_directory || is_archive))

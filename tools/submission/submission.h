@@ -7,7 +7,8 @@
 #include <stdint.h>
 
 enum submission_kind {
-    SUBMISSION_IMAGES, /* a directory with NAME.png, .exr, .pfm or .hdr of some image of the rubric */
+    SUBMISSION_IMAGES, /* a directory with NAME.png, .exr, .pfm or .hdr of some image of the rubric, and no
+                        * program or sources beside it, unless the rubric allows images */
     SUBMISSION_PROGRAM, /* a file, or a directory that needs no building */
     SUBMISSION_SOURCE   /* a directory or an archive, and the rubric has a `build` command */
 };
@@ -21,7 +22,7 @@ enum submission_state {
     SUBMISSION_USAGE        /* every run prints the program's usage text */
 };
 extern const char *const submission_state_name[]; /* "graded", "not_built", .. */
-extern const char submission_not_made[];          /* for an image: the reason is in submission.why */
+extern const char submission_not_made[]; /* for an image: the reason is in submission.why */
 
 struct submission {
     enum submission_kind kind;

@@ -44,6 +44,7 @@ TEST(each_reason_is_said)
     expect(with("state", json_string("not_built")), "not built", "not built");
     expect(with("state", json_string("not_started")), "did not start", "did not start");
     expect(with("state", json_string("usage")), "printed its usage", "printed its usage");
+    expect(with("flag", json_string("images alone")), "", "images alone");
     expect(with("pictures", json_pack("[{sn}]", "sha256")), "no image", "no image");
     expect(with_check("flag", json_string("a copy")), "", "floor: a copy");
     expect(with_check("judged", json_false()), "", "floor: not judged");

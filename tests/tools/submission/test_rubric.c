@@ -100,6 +100,15 @@ TEST(an_editors_mark_of_utf8_is_passed_over)
     assert_string_equal(rubric->title, "A course");
 }
 
+TEST(images_may_be_allowed)
+{
+    read_text(with(0, ""));
+    assert_false(rubric->images);
+    read_text(with(1, "rubric A course\nallow images"));
+    assert_int_equal(mistakes.num, 0);
+    assert_true(rubric->images);
+}
+
 TEST(images_by_their_old_word)
 {
     read_text(with(2, "picture p"));
@@ -195,6 +204,7 @@ TEST(each_mistake_is_named_with_its_line)
         {1, 3, "rubric a\nvariants 2\nvariants 3", "a second 'variants'"},
         {3, 3, " scene x_{variant}.dae", "without a line 'variants NUMBER' above"},
         {1, 1, "rubric a\ncommand ./x {scene} {out} {variant}", "{variant}"},
+        {1, 2, "rubric a\nallow programs", "only images can be allowed"},
         {1, 2, "rubric a\nmask 0 0 48", "needs a whole number"},
         {1, 3, "rubric a\nmask 0 0 48 5\nmask 0 0 4 5", "second 'mask'"},
         {1, 2, "rubric a\naccept slow", "needs a text"},

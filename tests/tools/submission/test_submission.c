@@ -1,5 +1,6 @@
 /* What is told of submissions without running them; tests/end_to_end/source.sh has those that are built and run. */
 #include "tools/submission/submission.h"
+#include "renderer/base/fs.h"
 #include "tests/support/test.h"
 
 TEST(a_name_is_that_of_the_folder_or_of_the_archive)
@@ -14,6 +15,39 @@ TEST(a_name_is_that_of_the_folder_or_of_the_archive)
         char id[128];
         submission_id(of[i][0], id);
         assert_string_equal(id, of[i][1]);
+    }
+}
+
+/* Of a directory that holds these files. */
+static enum submission_kind kind_with(const struct rubric *r, const char *const *files)
+{
+    struct submission s;
+    struct err e;
+    char name[64];
+    MUST(fs_remove_tree(test_path("handed"), &e) && fs_make_dirs(test_path("handed"), &e));
+    for (; *files != NULL; files++) {
+        snprintf(name, sizeof name, "handed/%s", *files);
+        test_write(test_path(name), "x", 1);
+    }
+    MUST(submission_open(r, test_path("handed"), test_path("work"), &s, &e));
+    return s.kind;
+}
+
+TEST(images_beside_a_program_are_not_what_is_graded)
+{
+    static struct rubric r = {.program = "pt", .num_images = 1, .limit = {.disk = 1 << 20}};
+    snprintf(r.image[0].name, sizeof r.image[0].name, "box");
+    static const char *const both[] = {"box.png", "pt", NULL}, *const alone[] = {"box.png", NULL},
+                             *const sources[] = {"box.png", "Makefile", NULL};
+    for (int allowed = 0; allowed < 2; allowed++) {
+        r.images = allowed > 0;
+        r.build[0] = '\0';
+        assert_int_equal(kind_with(&r, alone), SUBMISSION_IMAGES);
+        assert_int_equal(kind_with(&r, both), allowed ? SUBMISSION_IMAGES : SUBMISSION_PROGRAM);
+        assert_int_equal(kind_with(&r, sources), SUBMISSION_IMAGES);
+        snprintf(r.build, sizeof r.build, "make");
+        assert_int_equal(kind_with(&r, alone), SUBMISSION_IMAGES);
+        assert_int_equal(kind_with(&r, sources), allowed ? SUBMISSION_IMAGES : SUBMISSION_SOURCE);
     }
 }
 
