@@ -279,7 +279,7 @@ static bool run_program(const struct rubric *r, const struct sandbox *box,
     if (!submission_command(r, p, sub->program, seed, threads, text, sizeof text, argv, MAX_ARGS))
         return err_set(e, "%s: the command of image '%s' is too long", r->path, p->name);
     snprintf(rates, sizeof rates, "%.*s_rate.png", (int)(dot - r->output), r->output);
-    const struct path out = fs_path("%s/%s", work, p->name);
+    const struct path out = fs_path("%s/run-%s", work, p->name); /* not "box": sandbox.h */
     const struct path log = fs_path("%s/%s.log", out_dir, p->name);
     const char *const keep[] = {r->output, rates, NULL};
     const struct sandbox_job job = {.argv = argv,
