@@ -44,6 +44,20 @@ static bool join_names(const char *const *keep, char *out, size_t size, struct e
     return true;
 }
 
+/* The clock ticks that a run had used when the supervisor last looked, removed with the file; 0: unknown. */
+static long take_ticks(const char *out)
+{
+    const struct path path = fs_path("%s/.cpu", out);
+    long ticks = 0;
+    FILE *f = fopen(path.s, "r");
+    for (long t; f != NULL && fscanf(f, "%18ld", &t) == 1;)
+        ticks = t > ticks ? t : ticks;
+    if (f != NULL)
+        fclose(f);
+    unlink(path.s);
+    return ticks;
+}
+
 /* How the run ended, from the supervisor's report or, without one, from its time. A report written while the whole run
  * was being killed does not count: the program may have failed because its log was gone. no_memory: the kernel killed a
  * process for memory. */
@@ -53,8 +67,11 @@ static void read_report(const char *out, const struct sandbox_job *job, bool kil
     const struct path report = fs_path("%s/.report", out), memory = fs_path("%s/.memory", out);
     char word[16] = "";
     FILE *f = fopen(report.s, "r");
+    const long seen = take_ticks(out);
     long ticks = 0;
     bool known = f != NULL && fscanf(f, "%9d %15s %18ld", &r->status, word, &ticks) >= 2 && !killed;
+    if (!known)
+        ticks = seen;
     if (ticks > 0)
         r->cpu_s = (double)ticks / (double)sysconf(_SC_CLK_TCK);
     if (f != NULL)

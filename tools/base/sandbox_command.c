@@ -15,7 +15,8 @@
  * program cannot see; if there is no room for what is handed out, there is no report. TREE, SCENE,
  * KEEP_TREE: "" or not; WATCH: KiB. bwrap does not wait for the process that it starts, so the
  * program's processor time is found with process 1 of the outer layer, which inherits it: cutime and
- * cstime, fields 16 and 17 of its stat. */
+ * cstime, fields 16 and 17 of its stat. For a run that is killed with the supervisor, the watch writes
+ * down what all processes but ours have used so far: fields 14 to 17 of their stat; 24 is the memory. */
 static const char supervisor[] =
     "set -u\n"
     "umask 022\n"
@@ -25,8 +26,14 @@ static const char supervisor[] =
     "if [ -n \"$SCENE\" ] && ! cp -R \"$SCENE\" ./scene; then echo '125 unpack' >\"$OUT/.report\"; exit 125; fi\n"
     "if [ -n \"$FILTER\" ]; then \"$@\" 9<\"$FILTER\" & else \"$@\" & fi\n"
     "pid=$!\n"
-    "while sleep 0.2; do\n"
-    "  used=$(cat /proc/[0-9]*/statm 2>/dev/null | awk -v page=\"$PAGE\" '{ s += $2 } END { printf \"%d\", s * page }')\n"
+    "read -r me stat </proc/self/stat\n" /* the watch has another */
+    "while sleep 0.2 && read -r watch stat </proc/self/stat; do\n"
+    "  used=$(cat /proc/[0-9]*/stat 2>/dev/null | awk -v page=\"$PAGE\" -v me=$me -v watch=$watch '{\n"
+    "    pid = $1; sub(/^.*\\) /, \"\"); memory += $22\n"
+    "    if (pid != me && pid != watch && $2 != watch) cpu += $12 + $13 + $14 + $15\n"
+    "  } END { printf \"%d %d\", memory * page, cpu }')\n"
+    "  echo \"${used#* }\" >>\"$OUT/.cpu\"\n"
+    "  used=${used% *}\n"
     "  [ \"${used:-0}\" -le \"$WATCH\" ] || { : >\"$OUT/.memory\"; kill -9 $pid; exit; }\n"
     "done &\n"
     "watch=$!\n"

@@ -190,6 +190,21 @@ TEST(a_hang_ends_with_all_its_processes)
 
 /* The kernel looks at its clock ticks, which a busy host may withhold from a virtual machine for a second or two, and
  * the time of the sandbox's own start is counted too: 2.5 s have been seen. Without the limit it is 60 s. */
+TEST(a_killed_run_has_used_time)
+{
+    if (in != &box)
+        skip();
+    struct sandbox_limits limit = small;
+    limit.wall_s = 3;
+    struct sandbox_result busy = run_with("while :; do :; done", limit, NULL),
+                          idle = run_with("sleep 60", limit, NULL);
+    assert_int_equal(busy.end, SANDBOX_WALL);
+    assert_int_equal(idle.end, SANDBOX_WALL);
+    printf("busy for 3 s: %.2f CPU s; idle: %.2f\n", busy.cpu_s, idle.cpu_s);
+    assert_true(busy.cpu_s > 0.5 && busy.cpu_s < 4 && idle.cpu_s < 0.3);
+    assert_true(access(fs_path("%s/.cpu", out.s).s, F_OK) != 0);
+}
+
 TEST(a_busy_loop_ends_by_processor_time)
 {
     struct sandbox_limits limit = small;
