@@ -84,6 +84,7 @@ student usage 'TINY = fprintf(stderr, "tiny: invalid option\nUsage: tiny [option
 student crash 'TINY = abort();'
 student hang 'TINY = pause();'
 student hangs_once 'TINY = if (strstr(argv[argc - 1], "furnace")) pause();'
+student late 'TINY = atexit(abort);'
 student lost 'AFTER = rm liblevel.so'
 student moved 'AFTER = mkdir lib && mv liblevel.so lib'
 student other 'AFTER = mv tiny other'
@@ -139,6 +140,8 @@ said make bomb not_built 'It does not build: all 64 MiB of its directory are ful
 said make short not_built 'It does not build: short.zip cannot be unpacked'
 for name in moved network writes; do said make $name graded null && points make $name 4.0; done
 said make hangs_once graded null
+said make late graded null && points make late 4.0
+tell "a program that fails when it has written its image is told so" "$(grep -q "after the program had written 'a' it failed (killed by signal 6" "$tmp/make/late/grade.json" || echo it is not)"
 points make hangs_once 0.0
 tell "the same scene is not run again" "$(grep -q "not run, as the program did not end on this scene before (image 'a')" "$tmp/make/hangs_once/grade.json" || echo it is)"
 tell "another scene is" "$(grep -q '"file": "c.pfm"' "$tmp/make/hangs_once/grade.json" || echo it is not)"

@@ -128,6 +128,15 @@ static bool unpack(struct bare *b, struct sandbox_result *r, bool *done, struct 
     return ok;
 }
 
+/* What was handed in under the name of an output is none; in b->box, which may hold links. */
+static void remove_old_outputs(const struct bare *b)
+{
+    int box = open(b->box.s, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+    for (const char *const *name = b->job->keep; name != NULL && *name != NULL; name++)
+        unlinkat(box, *name, 0);
+    close(box);
+}
+
 static bool run_program(struct bare *b, struct sandbox_result *r, struct err *e)
 {
     struct sandbox_line *l = calloc(1, sizeof *l);
@@ -211,6 +220,7 @@ static bool run_made(struct bare *b, struct sandbox_result *r, struct err *e)
     bool done = false;
     if (!unpack(b, r, &done, e) || !done)
         return e->msg[0] == '\0';
+    remove_old_outputs(b);
     bool ok = run_program(b, r, e);
     for (const char *const *name = b->job->keep; ok && name != NULL && *name != NULL; name++)
         ok = hand_out(b, *name, e);

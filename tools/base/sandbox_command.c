@@ -22,7 +22,7 @@ static const char supervisor[] =
     "umask 022\n"
     "cd \"$BOX\" || exit 125\n"
     "if [ -n \"$TREE\" ] && ! tar -xf \"$TREE\"; then echo '125 unpack' >\"$OUT/.report\"; exit 125; fi\n"
-    "rm -rf ./scene\n"
+    "rm -rf ./scene $KEEP\n"
     "if [ -n \"$SCENE\" ] && ! cp -R \"$SCENE\" ./scene; then echo '125 unpack' >\"$OUT/.report\"; exit 125; fi\n"
     "if [ -n \"$FILTER\" ]; then \"$@\" 9<\"$FILTER\" & else \"$@\" & fi\n"
     "pid=$!\n"

@@ -87,7 +87,8 @@ static json_t *image_json(const struct rubric *r, const struct submitted_images 
     const struct rubric_image *p = &r->image[i];
     const struct made *made = &h->made[i];
     return json_pack("{ss, ss?, ss, ss, sf, sf, si, si, si, ss?}", "name", p->name, "file",
-                     made->path[0] == '\0' ? NULL : fs_base(made->path), "why", h->why[i], "end",
+                     made->path[0] == '\0' ? NULL : fs_base(made->path), "why",
+                     h->why[i][0] != '\0' ? h->why[i] : made->after, "end",
                      sandbox_end_name[made->end], "cpu_s", made->cpu_s, "wall_s", made->wall_s,
                      "width", p->width, "height", p->height, "runs", h->runs[i], "sha256",
                      h->image[i].mean != NULL ? h->image[i].sha256 : NULL);
@@ -100,6 +101,21 @@ static void tell_provisional(struct result *result)
         text_append(result->seen, sizeof result->seen,
                     "; too noisy to be decided: it takes about %.2g times the samples",
                     ceil(10 * result->more) / 10);
+}
+
+/* Staff and student are told of a program that failed after it had written an image of the check. */
+static void tell_failed(const struct rubric *r, const struct submitted_images *h,
+                        const struct rubric_check *c, struct result *result)
+{
+    for (int k = 0; k < c->num_images; k++) {
+        const struct made *made = &h->made[c->images[k]];
+        if (made->after[0] == '\0')
+            continue;
+        text_append(result->seen, sizeof result->seen,
+                    "; after the program had written '%s' it failed (%s), which costs no points",
+                    r->image[c->images[k]].name, made->after);
+        return;
+    }
 }
 
 /* Looks for the mistake of a submission that lost points, unless a check is flagged: a copied image
@@ -131,6 +147,7 @@ static bool add_checks(const struct collect *c, struct submitted_images *h, json
               find_mistake(c->job, h, &set, result, mistake, e);
     for (int i = 0; ok && i < r->num_checks; i++) {
         tell_provisional(&result[i]);
+        tell_failed(r, h, &r->check[i], &result[i]);
         provisional |= result[i].more > 0;
         json_array_append_new(checks, check_json(r, &r->check[i], &result[i]));
         part[r->check[i].part] += r->check[i].points * result[i].share;

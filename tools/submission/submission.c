@@ -308,6 +308,8 @@ static bool run_program(const struct rubric *r, const struct sandbox *box,
                   submission_printed_usage(log.s, usage, sizeof usage);
     if (made->usage)
         snprintf(made->why, sizeof made->why, "the program printed its usage text: %s", usage);
+    else if (result.end == SANDBOX_FAILED && there) /* what it wrote is judged for what it is */
+        snprintf(made->after, sizeof made->after, "%.250s", result.why);
     else if (result.end == SANDBOX_FAILED && (result.status == 126 || result.status == 127))
         snprintf(made->why, sizeof made->why, "the program does not start: %s", result.why);
     else if (result.end != SANDBOX_OK)

@@ -43,6 +43,7 @@ struct submission {
 struct made {
     char path[4400], rates[4400]; /* "": there is none; rates of adaptive sampling: NAME_rate.png */
     char why[600];                /* why there is none */
+    char after[300];              /* how the run failed that had written it; "": it did not fail */
     enum sandbox_end end;
     bool usage; /* there is none, and the program printed its usage text */
     double cpu_s, wall_s;

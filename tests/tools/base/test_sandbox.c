@@ -304,10 +304,11 @@ TEST(links_lead_nowhere)
     const struct path dir = fs_path("%s/submission", box.dir.path),
                       tree = fs_path("%s/tree.tar", box.dir.path);
     struct err e;
-    must_do(fs_path("mkdir %s && ln -s %s %s/out.png && ln -s / %s/scene && echo own >%s/second",
-                    dir.s, secret.s, dir.s, dir.s, dir.s));
+    must_do(fs_path("cd %s && mkdir submission && cd submission && ln -s %s out.png && "
+                    "ln -s %s in && ln -s / scene && echo own >mine",
+                    box.dir.path, secret.s, secret.s));
     MUST(sandbox_pack(dir.s, tree.s, MIB, &too_large, &e));
-    assert_int_equal(run_with("cat out.png", small, tree.s).end, SANDBOX_FAILED);
+    assert_int_equal(run_with("cp mine second; cat in", small, tree.s).end, SANDBOX_FAILED);
     assert_null(kept("out.png"));
     assert_string_equal(kept("second"), "own\n");
 }
@@ -490,6 +491,16 @@ TEST(a_tree_goes_from_one_run_to_the_next)
 }
 
 /* The unsafe mode, only on request: time and file size are bounded, the rest is open. */
+/* An image that was handed in under the output's name was not made by the run; a file of another name stays. */
+TEST(what_was_there_is_no_output)
+{
+    const struct path tree =
+        run_for_tree("echo old >out.png; echo old >second; echo old >third", "old.tar");
+    assert_int_equal(run_with("cat third >second", small, tree.s).end, SANDBOX_OK);
+    assert_null(kept("out.png"));
+    assert_string_equal(kept("second"), "old\n");
+}
+
 TEST(unsafe_is_as_unsafe_as_it_says)
 {
     struct sandbox s;
