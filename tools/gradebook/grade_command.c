@@ -269,6 +269,21 @@ static int grade(const struct grade_settings *s, const struct rubric *r, int arg
     return code;
 }
 
+/* What is allowed and may still be a mistake: 'after' an image of another scene, whose mistakes are then not charged
+ * again. */
+static void print_notes(const struct rubric *r)
+{
+    for (int i = 0; i < r->num_checks; i++) {
+        const struct rubric_check *c = &r->check[i];
+        if (c->after >= 0 && strcmp(r->image[c->after].scene, r->image[c->images[0]].scene) != 0)
+            fprintf(
+                stderr,
+                "%s:%d: note: 'after %s' is an image of another scene than check '%s'; right only if "
+                "it shows the same mistakes\n",
+                r->path, rubric_line_of_check(c, "after"), r->image[c->after].name, c->name);
+    }
+}
+
 /* Checks the rubric's other variants, too, and says what it holds. */
 static int check_rubric(const struct grade_settings *s, const struct suite *suite, struct rubric *r,
                         struct err *e)
@@ -277,6 +292,7 @@ static int check_rubric(const struct grade_settings *s, const struct suite *suit
     for (int variant = 2; variant <= r->variants; variant++)
         if (!rubric_read(s->rubric, suite, variant, r, &m, e) || !print_mistakes(r, &m, e))
             return err_prefix(e, "variant %d", variant), EXIT_NOT_JUDGED;
+    print_notes(r);
     char variants[32] = "";
     if (r->variants > 0)
         snprintf(variants, sizeof variants, ", %d variants", r->variants);

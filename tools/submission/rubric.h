@@ -52,8 +52,11 @@ struct rubric_set {
     char words[800]; /* "" of those by images */
 };
 
+/* The line of each statement of the whole, an image or a check, in the order of rubric.c's tables; 0: not given. */
+enum { RUBRIC_STATEMENTS = 20 };
+
 struct rubric_image {
-    int line;
+    int line, lines[RUBRIC_STATEMENTS];
     char name[48];
     char scene[256];                 /* as written: of the suite, or ending in .dae */
     const struct suite_scene *suite; /* NULL: a file beside the rubric */
@@ -74,7 +77,7 @@ struct margin {
 };
 
 struct rubric_check {
-    int line, part;
+    int line, lines[RUBRIC_STATEMENTS], part;
     char name[48];
     double points;
     enum check_kind kind;
@@ -108,6 +111,7 @@ struct rubric {
     struct rubric_image image[RUBRIC_IMAGES];
     struct rubric_check check[RUBRIC_CHECKS];
     int num_parts, num_images, num_checks;
+    int lines[RUBRIC_STATEMENTS];
     bool images;           /* what is handed in may be images alone */
     int variants, variant; /* how many there are, and which one this is, from 1; 0: none */
     int old_word_line;     /* the first that says "picture" for "image"; 0: none */
@@ -136,6 +140,9 @@ double rubric_option(const struct rubric_image *p, const char *option, int k);
 bool rubric_is_adaptive(const struct rubric_image *p);
 
 double rubric_points(const struct rubric *r);
+
+/* The line of a statement of a check, or of the check where it was not given. */
+int rubric_line_of_check(const struct rubric_check *c, const char *word);
 
 /* The file of an image's scene. */
 struct path rubric_scene(const struct rubric *r, const struct rubric_image *p);

@@ -2,6 +2,7 @@
 #include "rubric_internal.h"
 #include "renderer/base/cli.h"
 #include "renderer/base/fs.h"
+#include "renderer/pathtracer/options.h"
 
 #include "tools/base/text.h"
 #include "tools/images/tone_curve.h"
@@ -81,8 +82,10 @@ static void set_default(char *text, size_t size, const char *value)
         snprintf(text, size, "%s", value);
 }
 
-static void check_command(const char *command, struct rubric_mistakes *m)
+static void check_command(const struct rubric *r, struct rubric_mistakes *m)
 {
+    const char *command = r->command;
+    const int line = rubric_line(r, "command");
     static const char *const known[] = {"program", "scene",   "out",     "width",   "height", "spp",
                                         "lights",  "bounces", "threads", "options", "seed",   NULL};
     for (const char *c = strchr(command, '{'); c != NULL; c = strchr(c + 1, '{')) {
@@ -90,10 +93,10 @@ static void check_command(const char *command, struct rubric_mistakes *m)
         size_t n = strcspn(c + 1, "} ");
         snprintf(name, sizeof name, "%.*s", (int)(n < 31 ? n : 31), c + 1);
         if (!is_word(name, known))
-            rubric_mistake(m, LINE_WHOLE, "command: {%s} is nothing that is replaced", name);
+            rubric_mistake(m, line, "command: {%s} is nothing that is replaced", name);
     }
     if (strstr(command, "{out}") == NULL)
-        rubric_mistake(m, LINE_WHOLE, "command: without {out} there is no image");
+        rubric_mistake(m, line, "command: without {out} there is no image");
 }
 
 static bool is_beside(const struct rubric *r, const char *file)
@@ -112,24 +115,26 @@ static void check_head(struct rubric *r, struct rubric_mistakes *m)
     set_default(r->output, sizeof r->output, "out.png");
     set_default(r->program, sizeof r->program, "pathtracer");
     if (!tone_curve_parse(r->curve, &curve, &e))
-        rubric_mistake(m, LINE_WHOLE, "curve '%s' is none of: srgb, linear, gamma=G, cgl",
-                       r->curve);
+        rubric_mistake(m, rubric_line(r, "curve"),
+                       "curve '%s' is none of: srgb, linear, gamma=G, cgl", r->curve);
     const char *dot = strrchr(r->output, '.');
     if (dot == NULL || !is_word(dot, (const char *const[]){".png", ".exr", ".pfm", ".hdr", NULL}) ||
         r->output[strspn(r->output,
                          "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789._-")] !=
             '\0' ||
         r->output[0] == '.' || r->output[0] == '-')
-        rubric_mistake(m, LINE_WHOLE,
+        rubric_mistake(m, rubric_line(r, "output"),
                        "output '%s' is no file name ending in .png, .exr, .pfm or .hdr", r->output);
     if (r->program[0] == '/' || strstr(r->program, "..") != NULL)
-        rubric_mistake(m, LINE_WHOLE, "program '%s' is not inside the submission", r->program);
+        rubric_mistake(m, rubric_line(r, "program"), "program '%s' is not inside the submission",
+                       r->program);
     set_default(r->command, sizeof r->command,
                 "{program} -t {threads} -r {width} {height} -s {spp} -l {lights} -m {bounces} "
                 "{options} -f {out} {scene}");
-    check_command(r->command, m);
+    check_command(r, m);
     if (r->bugs[0] != '\0' && !is_beside(r, r->bugs))
-        rubric_mistake(m, LINE_WHOLE, "bugs: no directory '%s' beside the rubric", r->bugs);
+        rubric_mistake(m, rubric_line(r, "bugs"), "bugs: no directory '%s' beside the rubric",
+                       r->bugs);
 }
 
 static void check_golden(const struct rubric_image *p, const char *engine,
@@ -145,6 +150,53 @@ static void check_golden(const struct rubric_image *p, const char *engine,
               p->bounces != p->suite->depth))
         rubric_mistake(m, p->line, "image '%s': the golden of %s is %d x %d with %d bounces",
                        p->name, p->scene, p->suite->width, p->suite->height, p->suite->depth);
+}
+
+/* Does our renderer take the words? If not, *e has its line. */
+static bool are_ours(const struct rubric_image *p, const char *words, const char *accepted,
+                     struct err *e)
+{
+    enum { MOST = 128 };
+    char text[1200], *argv[MOST] = {"pathtracer"};
+    struct options ignored;
+    int num = 1;
+    snprintf(text, sizeof text, "-q -r %d %d -s 1 -l %d -m %d %s %s -f out.exr scene.dae", p->width,
+             p->height, p->lights, p->bounces, words, accepted);
+    for (char *at = text + strspn(text, " \t"); *at != '\0' && num < MOST - 1;) {
+        const size_t n = strcspn(at, " \t"), gap = strspn(at + n, " \t");
+        argv[num++] = at;
+        at += n + gap;
+        if (gap > 0)
+            at[-(ptrdiff_t)gap] = '\0';
+    }
+    return options_parse(num, argv, &ignored, e);
+}
+
+/* The options by which our renderer makes the image, or measures its noise (answer_key.c). */
+static void check_options(const struct rubric *r, const struct rubric_image *p,
+                          struct rubric_mistakes *m)
+{
+    const bool own = p->reference_options[0] != '\0';
+    const char *words = !own                                        ? p->options
+                        : strcmp(p->reference_options, "none") == 0 ? ""
+                                                                    : p->reference_options;
+    struct err e;
+    if (p->width == 0 || p->height == 0 || p->bounces < 0) /* which is another mistake */
+        return;
+    if (!are_ours(p, words, "", &e)) {
+        rubric_mistake(m, rubric_line_of_image(p, own ? "reference" : "options"),
+                       "image '%s': our renderer: %.100s%s", p->name, e.msg,
+                       own ? "" : " (see 'reference ours SPP none')");
+        return;
+    }
+    for (int i = 0; i < p->num_accepted; i++)
+        if (p->accept[i].how[0] == '-' && !are_ours(p, words, p->accept[i].how, &e))
+            rubric_mistake(m, p->accept[i].line, "'%s': our renderer: %.100s", p->accept[i].name,
+                           e.msg);
+    for (int i = 0; p->reference == REFERENCE_OURS && i < r->num_accepted; i++)
+        if (!are_ours(p, words, r->accept[i].how, &e))
+            rubric_mistake(m, r->accept[i].line, "'%s': our renderer, image '%s': %.100s",
+                           r->accept[i].name, p->name, e.msg);
 }
 
 static void check_image(const struct rubric *r, struct rubric_image *p, const struct suite *suite,
@@ -180,6 +232,7 @@ static void check_image(const struct rubric *r, struct rubric_image *p, const st
         else if (p->accept[i].how[0] == '-' && p->reference != REFERENCE_OURS)
             rubric_mistake(m, p->accept[i].line, "'%s' by options needs 'reference ours'",
                            p->accept[i].name);
+    check_options(r, p, m);
     if (!p->used)
         rubric_mistake(m, p->line, "image '%s' is in no check", p->name);
 }
@@ -198,21 +251,38 @@ static void check_carried(const struct rubric *r, struct rubric_check *c, struct
     if (!c->carried.given)
         c->carried = (struct margin){.full = 0.15, .none = 0.5};
     else if (c->after < 0)
-        rubric_mistake(m, c->line, "check '%s': 'carried' needs 'after IMAGE'", c->name);
+        rubric_mistake(m, rubric_line_of_check(c, "carried"),
+                       "check '%s': 'carried' needs 'after IMAGE'", c->name);
     if (c->after < 0)
         return;
+    const int line = rubric_line_of_check(c, "after");
     if (c->kind != CHECK_EQUAL)
-        rubric_mistake(m, c->line, "check '%s': 'after' is for 'equal'", c->name);
+        rubric_mistake(m, line, "check '%s': 'after' is for 'equal'", c->name);
     else if (!is_of_earlier_part(r, c, c->after))
-        rubric_mistake(m, c->line, "check '%s': 'after %s' is in no check of an earlier part",
-                       c->name, r->image[c->after].name);
+        rubric_mistake(m, line, "check '%s': 'after %s' is in no check of an earlier part", c->name,
+                       r->image[c->after].name);
     else if (r->image[c->after].width != r->image[c->images[0]].width ||
              r->image[c->after].height != r->image[c->images[0]].height)
-        rubric_mistake(m, c->line, "check '%s': 'after %s' has another size", c->name,
+        rubric_mistake(m, line, "check '%s': 'after %s' has another size", c->name,
                        r->image[c->after].name);
     else if (r->image[c->after].reference == REFERENCE_NONE)
-        rubric_mistake(m, c->line, "check '%s': 'after %s' has no reference", c->name,
+        rubric_mistake(m, line, "check '%s': 'after %s' has no reference", c->name,
                        r->image[c->after].name);
+}
+
+/* A black image is off by 100 %, and a share of pixels is at most that: a margin of 2 was meant as 2 %. */
+static void check_margins(const struct rubric_check *c, struct rubric_mistakes *m)
+{
+    const struct {
+        const char *name;
+        const struct margin *margin;
+    } of[] = {{"image", &c->image}, {"tile", &c->tile}, {"share", &c->share}, {"count", &c->count}};
+    for (size_t i = 0; c->kind != CHECK_GROWTH && i < sizeof of / sizeof *of; i++)
+        if (of[i].margin->full >= 1)
+            rubric_mistake(
+                m, rubric_line_of_check(c, of[i].name),
+                "check '%s': '%s': all points up to %g %%, black images too; margins are not in %%",
+                c->name, of[i].name, 100 * of[i].margin->full);
 }
 
 /* Which statements a kind of check has, and how many images. */
@@ -265,6 +335,7 @@ static void check_check(const struct rubric *r, struct rubric_check *c, struct r
             rubric_mistake(m, c->line, "check '%s': '%s' and '%s' have different sizes", c->name,
                            first->name, p->name);
     }
+    check_margins(c, m);
     set_default(c->visibility, sizeof c->visibility, "visible");
     struct err why;
     if (!cli_choice("visibility", c->visibility, visibilities, &(int){0}, &why))
@@ -321,6 +392,6 @@ void rubric_check_whole(struct rubric *r, const struct suite *suite, struct rubr
             rubric_mistake(m, r->part[i].line, "part '%s' has no checks", r->part[i].number);
     }
     if (r->total > 0 && fabs(rubric_points(r) - r->total) > 1e-9)
-        rubric_mistake(m, LINE_WHOLE, "the checks add up to %g points, not to %g", rubric_points(r),
-                       r->total);
+        rubric_mistake(m, rubric_line(r, "total"), "the checks add up to %g points, not to %g",
+                       rubric_points(r), r->total);
 }

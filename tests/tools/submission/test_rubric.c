@@ -83,11 +83,14 @@ TEST(a_right_one_is_read)
 
 TEST(what_is_carried_on)
 {
-    read_text(
-        with(11, " tile 0.1 0.2\npart 2 More\ncheck d 1 equal p\n image 1 2\n tile 1 2\n after p"));
+    read_text(with(
+        11,
+        " tile 0.1 0.2\npart 2 More\ncheck d 1 equal p\n image 0.1 0.2\n tile 0.1 0.2\n after p"));
     assert_int_equal(mistakes.num, 0);
     assert_int_equal(rubric->check[0].after, -1);
     assert_int_equal(rubric->check[1].after, 0);
+    assert_int_equal(rubric_line_of_check(&rubric->check[1], "after"), 16);
+    assert_int_equal(rubric_line_of_check(&rubric->check[1], "hint"), 13);
     assert_true(rubric->check[1].carried.full == 0.15 && rubric->check[1].carried.none == 0.5);
 }
 
@@ -164,7 +167,7 @@ static bool is_told(int line, const char *words)
 
 TEST(each_mistake_is_named_with_its_line)
 {
-    enum { ALONE = 6 };
+    enum { ALONE = 10 };
     static const struct {
         int at, line;
         const char *other, *words;
@@ -175,18 +178,23 @@ TEST(each_mistake_is_named_with_its_line)
         {7, 7, " refer\x1b[31mense\x7f truth\n reference truth", "'refer?[31mense?'"},
         {10, 10, " image 0.05 0.01", "must be less"},
         {10, 9, "", "needs 'image'"},
-        {11, 12, " tile 0.1 0.2\ncheck c 1 equal p\n image 1 2\n tile 1 2", "already in line 9"},
+        {11, 12, " tile 0.1 0.2\ncheck c 1 equal p\n image 0.1 0.2\n tile 0.1 0.2",
+         "already in line 9"},
+        {10, 10, " image 2 8", "all points up to 200 %"},
+        {11, 11, " tile 1 8", "all points up to 100 %"},
+        {7, 7, " reference ours 16 --nonsense", "our renderer: unknown option '--nonsense'"},
+        {6, 7, " bounces 1\n options --scene scenes/a.txt", "(see 'reference ours SPP none')"},
         /* There may be others. */
         {1, 1, "rubric", "needs a text"},
         {1, 1, "", "no 'rubric TITLE'"},
-        {1, 1, "rubric a\ncurve film", "curve 'film'"},
-        {1, 1, "rubric a\ncommand ./x {scene} {outt} {out}", "{outt}"},
-        {1, 1, "rubric a\ncommand ./x {scene}", "without {out}"},
-        {1, 1, "rubric a\noutput ../x.png", "no file name"},
-        {1, 1, "rubric a\noutput x.jpg", "no file name"},
-        {1, 1, "rubric a\nprogram /bin/sh", "not inside"},
-        {1, 1, "rubric a\ntotal 5", "add up to 4"},
-        {1, 1, "rubric a\nbugs nowhere", "no directory 'nowhere'"},
+        {1, 2, "rubric a\ncurve film", "curve 'film'"},
+        {1, 2, "rubric a\ncommand ./x {scene} {outt} {out}", "{outt}"},
+        {1, 2, "rubric a\ncommand ./x {scene}", "without {out}"},
+        {1, 2, "rubric a\noutput ../x.png", "no file name"},
+        {1, 2, "rubric a\noutput x.jpg", "no file name"},
+        {1, 2, "rubric a\nprogram /bin/sh", "not inside"},
+        {1, 2, "rubric a\ntotal 5", "add up to 4"},
+        {1, 2, "rubric a\nbugs nowhere", "no directory 'nowhere'"},
         {1, 2, "rubric a\nbugs a/b", "no name"},
         {1, 3, "rubric a\nbugs a\nbugs b", "a second 'bugs'"},
         {1, 3, "rubric a\ntotal 10\ntotal 20", "a second 'total'"},
@@ -203,7 +211,7 @@ TEST(each_mistake_is_named_with_its_line)
         {1, 2, "rubric a\nvariants 1", "variants"},
         {1, 3, "rubric a\nvariants 2\nvariants 3", "a second 'variants'"},
         {3, 3, " scene x_{variant}.dae", "without a line 'variants NUMBER' above"},
-        {1, 1, "rubric a\ncommand ./x {scene} {out} {variant}", "{variant}"},
+        {1, 2, "rubric a\ncommand ./x {scene} {out} {variant}", "{variant}"},
         {1, 2, "rubric a\nallow programs", "only images can be allowed"},
         {1, 2, "rubric a\nmask 0 0 48", "needs a whole number"},
         {1, 3, "rubric a\nmask 0 0 48 5\nmask 0 0 4 5", "second 'mask'"},
@@ -235,9 +243,9 @@ TEST(each_mistake_is_named_with_its_line)
         {11, 9, " tile 0.1 0.2\n ratio 0.1 0.2", "not for 'equal'"},
         {11, 9, " tile 0.1 0.2\n visibility never", "'never'"},
         {11, 12, " tile 0.1 0.2\n after q", "no image 'q'"},
-        {11, 9, " tile 0.1 0.2\n after p", "no check of an earlier part"},
-        {11, 9, " tile 0.1 0.2\n carried 0.1 0.2", "needs 'after"},
-        {11, 13,
+        {11, 12, " tile 0.1 0.2\n after p", "no check of an earlier part"},
+        {11, 12, " tile 0.1 0.2\n carried 0.1 0.2", "needs 'after"},
+        {11, 16,
          " tile 0.1 0.2\npart 2 Light\ncheck d 1 agree p p\n image 1 2\n tile 1 2\n after p",
          "is for 'equal'"},
     };
