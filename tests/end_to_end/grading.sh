@@ -49,6 +49,7 @@ check "eve has her own" bash -c "! grep -q eve '$tmp/alike'"
 tr -d '\n' <"$tmp/two/index.html" | sed -n 's/.*<h2>The noise of the reference//p' | sed 's,</ul>.*,,' >"$tmp/copied"
 check "mal has the reference's noise" grep -q '>mal</a>: cornell' "$tmp/copied"
 check "nobody else has" test "$(grep -o '<li>' "$tmp/copied" | wc -l)" -eq 1
+check "where no mistakes are known nobody says that none was found" grep -q 'What is wrong shows <b>' "$tmp/two/bob/index.html"
 check "on one processor" grade -o "$tmp/one" -j 1
 check "the same points and reasons on one and on two" test "$(sums "$tmp/one")" = "$(sums "$tmp/two")"
 rm -r "$tmp/one/ada" "$tmp/one/eve/grade.json"

@@ -56,8 +56,11 @@ void grade_summary_bug(FILE *f, const json_t *grade)
     } else if (located[0] != '\0' ||
                strcmp(member_or_empty(diagnosis, "finding"), "unknown") == 0) {
         fputs("<div class=\"finding\">", f);
+        const bool looked = json_object_get(diagnosis, "finding") != NULL;
         if (located[0] != '\0')
-            html_print(f, "<p>No known mistake explains all of it. It shows <b>%s</b>.</p>\n",
+            html_print(f, "<p>%s <b>%s</b>.</p>\n",
+                       looked ? "No known mistake explains all of it. It shows"
+                              : "What is wrong shows",
                        located);
         else
             fputs(
