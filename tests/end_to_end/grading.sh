@@ -50,6 +50,13 @@ tr -d '\n' <"$tmp/two/index.html" | sed -n 's/.*<h2>The noise of the reference//
 check "mal has the reference's noise" grep -q '>mal</a>: cornell' "$tmp/copied"
 check "nobody else has" test "$(grep -o '<li>' "$tmp/copied" | wc -l)" -eq 1
 check "where no mistakes are known nobody says that none was found" grep -q 'What is wrong shows <b>' "$tmp/two/bob/index.html"
+# The command on the page of staff, as a shell reads it, from where the class was graded.
+(cd "$tmp" && "$build/assay" grade -q -o "the class's" "$OLDPWD/$rubric" submissions/ada >/dev/null 2>&1)
+printed=$(python3 -c 'import html, re, sys
+print(html.unescape(re.search("<pre><code>(assay grade .*)</code></pre>", open(sys.argv[1]).read())[1]))' "$tmp/the class's/ada/staff.html")
+rm "$tmp/the class's/ada/grade.json"
+check "the printed command grades again: $printed" env -C "$tmp" PATH="$build:$PATH" sh -c "$printed"
+check "into the same directory" test -e "$tmp/the class's/ada/grade.json" -a ! -e "$tmp/grades"
 check "on one processor" grade -o "$tmp/one" -j 1
 check "the same points and reasons on one and on two" test "$(sums "$tmp/one")" = "$(sums "$tmp/two")"
 rm -r "$tmp/one/ada" "$tmp/one/eve/grade.json"

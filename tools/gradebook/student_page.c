@@ -6,9 +6,11 @@
 #include "grade_images.h"
 #include "grade_needs.h"
 #include "renderer/base/fs.h"
+#include "renderer/base/shell_quote.h"
 #include "tools/html/html.h"
 #include "tools/results/results.h"
 
+#include <stdlib.h>
 #include <string.h>
 
 struct page {
@@ -223,8 +225,23 @@ static void show_runs(const struct page *p)
     html_table_close(p->f);
 }
 
+/* The command that grades this one again, into the same directory. */
+static bool show_command(const struct page *p, struct err *e)
+{
+    static const char begin[] = "assay grade ";
+    const char *command = member_or_empty(p->grade, "command");
+    if (strncmp(command, begin, strlen(begin)) != 0)
+        return true;
+    char *out = shell_quote_join("-o", (const char *const[]){p->dir, NULL});
+    if (out == NULL)
+        return err_set(e, "out of memory");
+    html_print(p->f, "<pre><code>%s%s %s</code></pre>\n", begin, out, command + strlen(begin));
+    free(out);
+    return true;
+}
+
 /* How it was graded. */
-static void show_facts(const struct page *p)
+static bool show_facts(const struct page *p, struct err *e)
 {
     const json_t *grade = p->grade;
     FILE *f = p->f;
@@ -241,10 +258,11 @@ static void show_facts(const struct page *p)
     fact(f, "other points in another run, chance", html_number(member_number(grade, "chance")).s);
     fact(f, "version", member_or_empty(grade, "version"));
     fputs("</dl>\n", f);
-    if (member_text(grade, "command") != NULL)
-        html_print(f, "<pre><code>%s</code></pre>\n", member_text(grade, "command"));
+    if (!show_command(p, e))
+        return false;
     if (json_array_size(json_object_get(grade, "pictures")) > 0)
         show_runs(p);
+    return true;
 }
 
 static bool page(const struct page *p, struct err *e)
@@ -264,8 +282,7 @@ static bool page(const struct page *p, struct err *e)
         left_out |= !grade_summary_shows(c, p->staff);
     if (left_out)
         fputs("<p>Some checks are not shown yet.</p>\n", p->f);
-    if (p->staff)
-        show_facts(p);
+    ok = ok && (!p->staff || show_facts(p, e));
     if (built)
         grade_summary_build_log(p->f, p->dir, p->grade);
     fputs("</div>\n", p->f);
