@@ -101,6 +101,7 @@ touch -d '+9 hours' "$tmp/mac/My Homework/build/tiny" "$tmp/mac/My Homework/tiny
 (cd "$tmp/mac" && zip -qr "$tmp/zipped.zip" .) && tar -C "$tmp/mac" -czf "$tmp/packed.tar.gz" . && mkdir "$tmp/inside" && cp "$tmp/zipped.zip" "$tmp/inside"
 head -c 200M /dev/zero >"$tmp/bomb/zeros" && (cd "$tmp/bomb" && zip -q "$tmp/class/bomb.zip" zeros)
 head -c 1000 "$tmp/zipped.zip" >"$tmp/class/short.zip"
+printf 'Rar!\x1a\x07\x01' >"$tmp/class/rar.rar"
 
 grade() { "$build/assay" grade -j 2 -o "$tmp/$1" "${@:2}"; }
 field() { sed -n "s/^ \"$3\": \(.*[^,]\),\{0,1\}$/\1/p" "$tmp/$1/$2/grade.json" | tr -d '"'; }
@@ -138,6 +139,7 @@ said make empty not_built 'It does not build: there is no .*akefile in it'
 said make two not_built 'It does not build: more than one folder holds a .*akefile: a b'
 said make bomb not_built 'It does not build: all 64 MiB of its directory are full'
 said make short not_built 'It does not build: short.zip cannot be unpacked'
+said make rar not_built 'It does not build: rar.rar cannot be unpacked: such archives are not read here, but .zip'
 for name in moved network writes; do said make $name graded null && points make $name 4.0; done
 said make hangs_once graded null
 said make late graded null && points make late 4.0
@@ -156,6 +158,15 @@ cp -R "$tmp/tree" "$tmp/made" && make -sC "$tmp/made" && mkdir "$tmp/built" && c
 (cd "$tmp/built" && zip -q "$tmp/prebuilt.zip" tiny liblevel.so)
 expect "programs" 0 "4.00 of 6" grade programs "$tmp/cmake.rubric" "$tmp/built" "$tmp/prebuilt.zip"
 for name in built prebuilt; do points programs $name 4.0; done
+# As a web form stores them: without their mode, as Windows ends lines, an archive without the ending of its name.
+mkdir "$tmp/modes" "$tmp/modes/windows" && cp -R "$tmp/built" "$tmp/modes/lost" && chmod a-x "$tmp/modes/lost/tiny"
+printf '#!/bin/sh\r\n./x\r\n' >"$tmp/modes/windows/tiny" && cp "$tmp/zipped.zip" "$tmp/modes/bare"
+cp "$tmp/made/tiny" "$tmp/modes/alone" && chmod a-x "$tmp/modes/alone"
+expect "programs that were not executable" 2 "4.00 of 6" grade modes "$tmp/cmake.rubric" "$tmp/modes"/*
+points modes lost 4.0
+said modes alone not_started 'It does not start: the shared library liblevel.so is missing'
+said modes windows not_started 'It does not start: the first line of tiny ends as on Windows'
+said modes bare not_started 'It does not start: bare is an archive: it is unpacked if its name ends in .zip'
 
 # The compiler cache: filled by staff only, from the starter code.
 if command -v ccache >/dev/null; then

@@ -245,7 +245,10 @@ bool submission_open(const struct rubric *r, const char *path, const char *work,
         return false;
     chmod(work, 0755);
     out->kind = kind_of(r, out, S_ISDIR(st.st_mode), archive);
-    out->packed = S_ISDIR(st.st_mode) ? !has(out, out->program) : archive;
+    const struct path program = fs_path("%s/%s", out->path, out->program);
+    /* A program whose mode was lost on the way here, by a web form or Windows, gets it back. */
+    out->packed = S_ISDIR(st.st_mode) ? access(program.s, X_OK) != 0
+                                      : archive || access(out->path, X_OK) != 0;
     if ((size_t)snprintf(out->tree, sizeof out->tree, "%s/tree.tar", work) >= sizeof out->tree)
         return err_set(e, "%s: path too long", work);
     bool too_large;

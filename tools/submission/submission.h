@@ -31,7 +31,7 @@ struct submission {
     char tree[512];    /* of programs: a tar, of the built tree where there is something to build */
     char program[160]; /* as {program} is replaced */
     char sha256[65];   /* of the tar of what was handed in */
-    bool packed;       /* an archive, or a directory in which the program has to be looked for */
+    bool packed;       /* an archive, or its program has to be looked for or made executable */
     char library[1024]; /* LD_LIBRARY_PATH that it needs; "": none */
     enum submission_state state;
     char why[600];    /* what is wrong with the whole, a sentence; or "" */

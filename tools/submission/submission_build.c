@@ -42,6 +42,7 @@ static const char build_script[] =
     "    *.[zZ][iI][pP] | *.tar | *.tar.* | *.t[gbx]z | *.7z | *.rar)\n"
     "      mkdir .new || exit 97\n"
     "      case $one in\n"
+    "        *.7z | *.rar) why='such archives are not read here, but .zip and .tar.gz are'; false ;;\n"
     "        *.[zZ][iI][pP]) command -v unzip >/dev/null || exit 96\n"
     "          why=$(unzip -q -o \"$one\" -d .new 2>&1); [ $? -le 1 ] ;;\n"
     "        *) why=$(tar -xf \"$one\" -C .new 2>&1) ;;\n"
@@ -93,6 +94,10 @@ static const char probe_script[] =
     "case $magic in\n"
     "  cffaedfe | cafebabe) fail \"${PROGRAM#./} is a program for macOS\" ;;\n"
     "  4d5a*) fail \"${PROGRAM#./} is a program for Windows\" ;;\n"
+    "  504b0304 | 52617221 | 377abcaf | 1f8b*)\n"
+    "    fail \"${PROGRAM#./} is an archive: it is unpacked if its name ends in .zip, .tar.gz or the like\" ;;\n"
+    "  2321*) head -n 1 \"$PROGRAM\" | grep -q \"$(printf '\\r')\" || exit 0\n"
+    "    fail \"the first line of ${PROGRAM#./} ends as on Windows (CR LF), so its interpreter is not found\" ;;\n"
     "  7f454c46) ;;\n"
     "  *) exit 0 ;;\n"
     "esac\n"
@@ -204,7 +209,7 @@ static bool build(const struct rubric *r, const struct sandbox *box, const char 
 {
     char program[sizeof s->program + 16], words[sizeof r->build + 16], why[500];
     snprintf(program, sizeof program, "PROGRAM=%s", s->program);
-    snprintf(words, sizeof words, "BUILD=%s", r->build);
+    snprintf(words, sizeof words, "BUILD=%s", s->kind == SUBMISSION_SOURCE ? r->build : "");
     const struct path out = fs_path("%s/build", work), built = fs_path("%s/tree.tar", out.s);
     struct sandbox_job job = {
         .argv = (const char *const[]){"env", program, words, "sh", "-c", build_script, NULL},
