@@ -190,6 +190,7 @@ static void changes(FILE *f, json_t *const *sorted, size_t num)
 struct tally {
     const char *text;
     double num;
+    const json_t *grade;
 };
 
 static int by_num(const void *a, const void *b)
@@ -227,38 +228,60 @@ static void common_bugs(FILE *f, const json_t *grades, struct tally *t)
     fputs("</table>\n", f);
 }
 
+/* How many of its images were not made because the program did not end. */
+static int without_end(const json_t *grade)
+{
+    int num = 0;
+    json_each(p, json_object_get(grade, "pictures"))
+        num += strcmp(member_or_empty(p, "end"), "wall time") == 0 ||
+               strcmp(member_or_empty(p, "end"), "processor time") == 0;
+    return num;
+}
+
 static void slowest(FILE *f, const json_t *grades, struct tally *t)
 {
     size_t num = 0;
     json_each(g, grades)
-        t[num++] =
-            (struct tally){.text = member_or_empty(g, "id"), .num = member_number(g, "cpu_s")};
+        t[num++] = (struct tally){member_or_empty(g, "id"), member_number(g, "cpu_s"), g};
     qsort(t, num, sizeof *t, by_num);
     fputs("<h2>Slowest</h2><table>\n", f);
-    for (size_t i = 0; i < num && i < SLOWEST; i++)
-        html_print(f, "<tr><td class=\"num\">%.1f s</td><td>%s</td></tr>\n", t[i].num, t[i].text);
+    for (size_t i = 0; i < num && i < SLOWEST; i++) {
+        const int lost = without_end(t[i].grade);
+        html_print(f, "<tr><td class=\"num\">%s%.1f s</td><td>%s</td></tr>\n",
+                   lost > 0 ? "more than " : "", t[i].num, t[i].text);
+    }
     fputs("</table>\n", f);
 }
 
-/* Submissions that share an image bit by bit. A program without a seed of its own always makes the same one, and two
- * that follow the text to the letter may make the same: no proof of anything. */
+/* Have both all images in common, two at least, bit by bit? */
+static bool same_images(const json_t *g, const json_t *h)
+{
+    size_t m, same = 0, num = 0;
+    json_t *p;
+    json_array_foreach(json_object_get(g, "pictures"), m, p) {
+        const char *a = member_or_empty(p, "sha256"),
+                   *b =
+                       member_or_empty(json_array_get(json_object_get(h, "pictures"), m), "sha256");
+        num += a[0] != '\0';
+        same += a[0] != '\0' && strcmp(a, b) == 0;
+    }
+    return num >= 2 && same == num;
+}
+
+/* Submissions that share their images, a line for all that have the same. A program without a seed of its own always
+ * makes the same one, and two that follow the text to the letter may make the same: no proof of anything. */
 static void look_alikes(FILE *f, const json_t *grades)
 {
-    size_t i, k, m;
-    json_t *g, *h, *p;
+    const size_t num = json_array_size(grades);
     bool any = false;
-    json_array_foreach(grades, i, g) {
-        for (k = i + 1; k < json_array_size(grades); k++) {
-            size_t same = 0, num = 0;
-            h = json_array_get(grades, k);
-            json_array_foreach(json_object_get(g, "pictures"), m, p) {
-                const char *a = member_or_empty(p, "sha256"),
-                           *b = member_or_empty(json_array_get(json_object_get(h, "pictures"), m),
-                                                "sha256");
-                num += a[0] != '\0';
-                same += a[0] != '\0' && strcmp(a, b) == 0;
-            }
-            if (num < 2 || same < num)
+    for (size_t i = 0; i < num; i++) {
+        const json_t *g = json_array_get(grades, i);
+        bool told = false, more = false;
+        for (size_t k = 0; k < i && !told; k++)
+            told = same_images(json_array_get(grades, k), g);
+        for (size_t k = i + 1; k < num && !told; k++) {
+            const json_t *h = json_array_get(grades, k);
+            if (!same_images(g, h))
                 continue;
             if (!any)
                 fputs(
@@ -266,11 +289,14 @@ static void look_alikes(FILE *f, const json_t *grades)
                     "make the same.</p><ul>\n",
                     f);
             any = true;
-            html_print(f, "<li>%s and %s</li>\n", member_text(g, "id"), member_text(h, "id"));
+            if (!more)
+                html_print(f, "<li>%s", member_text(g, "id"));
+            more = true;
+            html_print(f, ", %s", member_text(h, "id"));
         }
+        fputs(more ? "</li>\n" : "", f);
     }
-    if (any)
-        fputs("</ul>\n", f);
+    fputs(any ? "</ul>\n" : "", f);
 }
 
 /* Puts i, all that are alike to it, and so on, into the group `number`. group[k]: group of k from 1
@@ -290,9 +316,17 @@ static void join_group(const json_t *grades, size_t i, int number, int *group)
 
 static void list_group(FILE *f, const json_t *grades, int number, const int *group)
 {
-    size_t i, members = 0;
+    enum { HANDOUT = 4 }; /* who copy are fewer */
+    size_t i, members = 0, all = 0;
     json_t *g;
+    for (i = 0; i < json_array_size(grades); i++)
+        all += group[i] == number;
     fputs("<li>", f);
+    if (all >= HANDOUT && 4 * all >= json_array_size(grades))
+        fprintf(
+            f,
+            "%zu of %zu, so many that it is probably the generator of random numbers that all were given: ",
+            all, json_array_size(grades));
     json_array_foreach(grades, i, g) {
         if (group[i] != number)
             continue;

@@ -3,6 +3,7 @@
 
 #include "renderer/image/tone.h"
 #include "tools/gradebook/same_noise.h"
+#include "tools/gradebook/student_page.h"
 #include "tests/support/own.h"
 #include "tests/tools/grade/submit_codes.h"
 #include "tests/support/test.h"
@@ -194,6 +195,57 @@ TEST(too_fine_to_tell)
     assert_true(isnan(same_noise_t(&a, &b)));
     same_noise_free(&a);
     same_noise_free(&b);
+}
+
+/* A class of `num`, of which the first `alike` have the same noise and the same two images. */
+static char *page_of(int num, int alike)
+{
+    json_auto_t *grades = json_array();
+    char *text;
+    size_t size;
+    struct err e;
+    for (int i = 0; i < num; i++) {
+        char id[16], sha[16];
+        snprintf(id, sizeof id, "s%d", i);
+        snprintf(sha, sizeof sha, "%d", i < alike ? 0 : i);
+        json_t *grade = json_pack("{ss, ss, sf, s[{ss, ss}, {ss, ss}]}", "rubric", "R", "id", id,
+                                  "cpu_s", 1.0 + i, "pictures", "sha256", sha, "end",
+                                  i == num - 1 ? "wall time" : "ok", "sha256", sha, "end", "ok");
+        snprintf(id, sizeof id, "s%d", i + 1 < alike ? i + 1 : i - 1);
+        if (i < alike) /* a chain */
+            json_object_set_new(grade, "alike", json_pack("[{ss}]", "id", id));
+        json_array_append_new(grades, grade);
+    }
+    FILE *f = open_memstream(&text, &size);
+    MUST(class_page(f, grades, &e));
+    fclose(f);
+    return text;
+}
+
+TEST(many_alike_have_what_all_were_given)
+{
+    static const struct {
+        int num, alike;
+        const char *words; /* NULL: of the handout nothing is said */
+    } of[] = {{12, 5, "5 of 12, so many"}, {12, 3, NULL}, {40, 5, NULL}};
+    for (size_t i = 0; i < COUNT(of); i++) {
+        char *text = page_of(of[i].num, of[i].alike);
+        assert_int_equal(strstr(text, "The same noise") != NULL, 1);
+        assert_int_equal(strstr(text, "so many") != NULL, of[i].words != NULL);
+        if (of[i].words != NULL)
+            assert_non_null(strstr(text, of[i].words));
+        free(text);
+    }
+}
+
+TEST(the_same_images_are_one_line)
+{
+    char *text = page_of(6, 4);
+    assert_non_null(strstr(text, "<li>s0, s1, s2, s3</li>"));
+    assert_null(strstr(text, "<li>s1, s2"));
+    assert_non_null(strstr(text, "more than 6.0 s</td><td>s5"));
+    assert_non_null(strstr(text, ">5.0 s</td><td>s4"));
+    free(text);
 }
 
 TEST_GROUP(set_up, tear_down)
