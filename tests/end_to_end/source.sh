@@ -101,6 +101,7 @@ touch -d '+9 hours' "$tmp/mac/My Homework/build/tiny" "$tmp/mac/My Homework/tiny
 (cd "$tmp/mac" && zip -qr "$tmp/zipped.zip" .) && tar -C "$tmp/mac" -czf "$tmp/packed.tar.gz" . && mkdir "$tmp/inside" && cp "$tmp/zipped.zip" "$tmp/inside"
 head -c 200M /dev/zero >"$tmp/bomb/zeros" && (cd "$tmp/bomb" && zip -q "$tmp/class/bomb.zip" zeros)
 head -c 1000 "$tmp/zipped.zip" >"$tmp/class/short.zip"
+echo text >"$tmp/class/plain.tar.gz"
 printf 'Rar!\x1a\x07\x01' >"$tmp/class/rar.rar"
 
 grade() { "$build/assay" grade -j 2 -o "$tmp/$1" "${@:2}"; }
@@ -138,7 +139,8 @@ said make hog not_built 'It does not build: .*300 MiB of memory'
 said make empty not_built 'It does not build: there is no .*akefile in it'
 said make two not_built 'It does not build: more than one folder holds a .*akefile: a b'
 said make bomb not_built 'It does not build: all 64 MiB of its directory are full'
-said make short not_built 'It does not build: short.zip cannot be unpacked'
+said make short not_built 'It does not build: short.zip cannot be unpacked: it is damaged, or no zip archive'
+said make plain not_built 'It does not build: plain.tar.gz cannot be unpacked: .*does not look like a tar archive'
 said make rar not_built 'It does not build: rar.rar cannot be unpacked: such archives are not read here, but .zip'
 for name in moved network writes; do said make $name graded null && points make $name 4.0; done
 said make hangs_once graded null
