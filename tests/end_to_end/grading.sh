@@ -94,6 +94,9 @@ for id in "deaf", "dim", "right":
 }
 tell "further runs decide where there was too much noise" "$(runs "$tmp/noisy" | diff - <(printf '%s\n' 'deaf 8.0 True more' 'dim 0.0 False 1' 'right 8.0 False more'))"
 tell "and none is asked for without a budget" "$(runs "$tmp/poor" | diff - <(printf '%s\n' 'deaf 8.0 True 1' 'dim 0.0 False 1' 'right 8.0 True 1'))"
+seen() { tell "$1's reason: $3" "$(grep -q "too noisy to be decided.*$3" "$tmp/$2/$1/grade.json" || grep '"seen"' "$tmp/$2/$1/grade.json")"; }
+seen right poor "the next run is not within 'budget cpu 0'"
+seen deaf noisy "samples, and .*'box'" # the same with another number, or too slow on a busy machine
 "$build/assay" grade -q --unsafe-no-sandbox -o "$tmp/bare" "$tmp/poor.rubric" "$tmp/submissions/right" >"$tmp/out" 2>&1
 check "without a sandbox an image may have the name of its directory" grep -q '"file": "box.png"' "$tmp/bare/right/grade.json"
 rm -r "$tmp/submissions" && mv "$tmp/class" "$tmp/submissions"

@@ -138,6 +138,28 @@ static bool was_tried(const double *tried, int num, double spp)
     return false;
 }
 
+/* Says why an image has no further run: it has had the most, a longer one might be killed, or there is no other number
+ * of samples. */
+static void tell_no_more(const struct collect *c, struct submitted_images *h, int image)
+{
+    const struct rubric_image *p = &c->job->rubric->image[image];
+    const struct sandbox_limits *limit = &c->job->rubric->limit;
+    const struct made *made = &h->made[image];
+    const int most = rubric_is_adaptive(p) ? MOST_ADAPTIVE : MOST_RUNS;
+    const double cpu = made->cpu_s / limit->cpu_s, wall = made->wall_s / limit->wall_s;
+    char *why = h->no_more[image];
+    if (h->runs[image] >= most)
+        snprintf(why, sizeof *h->no_more, "'%s' has had %d runs, the most", p->name, most);
+    else if (fmax(cpu, wall) > 1.0 / 128) /* else limits would allow 64 times the samples */
+        snprintf(why, sizeof *h->no_more,
+                 "a longer run of '%s' might not end within 'limit %s %g': the first took %.2g s",
+                 p->name, wall > cpu ? "wall" : "cpu", wall > cpu ? limit->wall_s : limit->cpu_s,
+                 wall > cpu ? made->wall_s : made->cpu_s);
+    else
+        snprintf(why, sizeof *h->no_more,
+                 "'%s' has no further run with another number of samples that would help", p->name);
+}
+
 /* Samples a pixel of the next run of an image that needs `more` times those it has; 0: no run is
  * possible. A square where the rubric asks for one, as programs that stratify pixels rely on it. */
 static int next_samples(const struct collect *c, const struct purchases *b,
@@ -203,7 +225,7 @@ static int noisiest(const struct rubric_check *c, const struct result *result,
 
 /* Index of the image with the cheapest next run that an undecided check needs; *spp: its samples.
  * -1: none is left, or none within the budget. */
-static int cheapest(const struct collect *c, const struct submitted_images *h,
+static int cheapest(const struct collect *c, struct submitted_images *h,
                     const struct result *result, struct purchases *b, int *spp)
 {
     const struct rubric *r = c->job->rubric;
@@ -218,6 +240,7 @@ static int cheapest(const struct collect *c, const struct submitted_images *h,
         double cost = cost_of(h, &r->image[image], image, samples);
         if (samples == 0) {
             b->stuck[image] = true;
+            tell_no_more(c, h, image);
         } else if (cost <= least) {
             least = cost;
             best = image;
@@ -326,6 +349,11 @@ static bool take_run(const struct collect *c, struct submitted_images *h, int im
         bool fallen = same ? !should_vary(s, use) : !third || alone || has_fallen(runs, use);
         h->fixed[image] = !fallen && !rubric_is_adaptive(&c->job->rubric->image[image]);
         b->stuck[image] = same || h->fixed[image];
+        if (b->stuck[image])
+            snprintf(h->no_more[image], sizeof *h->no_more,
+                     same ? "'%s' is the same with another number of samples"
+                          : "the noise of '%s' does not fall with the samples",
+                     c->job->rubric->image[image].name);
         submitted_image_free(&right);
         ok = keep_copies(s, more, first, &b->last[image], e);
         if (ok && !alone) {
@@ -359,6 +387,9 @@ static bool buy(const struct collect *c, struct submitted_images *h, int image, 
     h->bought_s += made.cpu_s;
     if (more.mean == NULL) {
         b->stuck[image] = true;
+        snprintf(h->no_more[image], sizeof *h->no_more,
+                 "a run of '%s' with %d samples made no image (%.80s)",
+                 c->job->rubric->image[image].name, spp, why);
         return true;
     }
     if (rubric_is_adaptive(&as))

@@ -94,13 +94,29 @@ static json_t *image_json(const struct rubric *r, const struct submitted_images 
                      h->image[i].mean != NULL ? h->image[i].sha256 : NULL);
 }
 
-/* Staff are told how far from a decision it is. */
-static void tell_provisional(struct result *result)
+/* Staff are told how far from a decision it is, and what kept it from one: the noisiest image that can have further
+ * runs, or else the noisiest. */
+static void tell_provisional(const struct rubric *r, const struct submitted_images *h,
+                             const struct rubric_check *c, struct result *result)
 {
-    if (result->more > 0)
+    int noisiest = 0;
+    if (result->more <= 0)
+        return;
+    for (int k = 1; k < c->num_images; k++)
+        if (result->noise[k] > result->noise[noisiest])
+            noisiest = k;
+    const char *why = h->no_more[c->images[noisiest]];
+    for (int k = 0; k < c->num_images; k++)
+        if (h->no_more[c->images[k]][0] == '\0')
+            why = "";
+    text_append(result->seen, sizeof result->seen,
+                "; too noisy to be decided: it takes about %.2g times the samples",
+                ceil(10 * result->more) / 10);
+    if (why[0] != '\0')
+        text_append(result->seen, sizeof result->seen, ", and %s", why);
+    else
         text_append(result->seen, sizeof result->seen,
-                    "; too noisy to be decided: it takes about %.2g times the samples",
-                    ceil(10 * result->more) / 10);
+                    ", and the next run is not within 'budget cpu %g'", r->budget_s);
 }
 
 /* Staff and student are told of a program that failed after it had written an image of the check. */
@@ -146,7 +162,7 @@ static bool add_checks(const struct collect *c, struct submitted_images *h, json
               collect_until_decided(c, h, result, &set, e) &&
               find_mistake(c->job, h, &set, result, mistake, e);
     for (int i = 0; ok && i < r->num_checks; i++) {
-        tell_provisional(&result[i]);
+        tell_provisional(r, h, &r->check[i], &result[i]);
         tell_failed(r, h, &r->check[i], &result[i]);
         provisional |= result[i].more > 0;
         json_array_append_new(checks, check_json(r, &r->check[i], &result[i]));
