@@ -131,7 +131,7 @@ kill_golden() {
 
 kill_grading() {
     local why="" k=0 start most i out=$tmp/grades
-    cp tests/end_to_end/quick.rubric "$tmp/quick.rubric"
+    sed 's/^total/allow images\n&/' tests/end_to_end/quick.rubric >"$tmp/quick.rubric"
     mkdir -p "$tmp/subs"
     for i in 1 2 3 4 5 6 7 8; do
         mkdir "$tmp/subs/s$i"
