@@ -280,7 +280,8 @@ static void print_notes(const struct rubric *r)
                 stderr,
                 "%s:%d: note: 'after %s' is an image of another scene than check '%s'; right only if "
                 "it shows the same mistakes\n",
-                r->path, rubric_line_of_check(c, "after"), r->image[c->after].name, c->name);
+                r->path, rubric_line_of(c->lines, "after", c->line), r->image[c->after].name,
+                c->name);
     }
 }
 

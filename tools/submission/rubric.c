@@ -413,45 +413,20 @@ _Static_assert(sizeof of_rubric / sizeof *of_rubric <= RUBRIC_STATEMENTS &&
                    sizeof of_check / sizeof *of_check <= RUBRIC_STATEMENTS,
                "a line for each");
 
-static int row_of(const struct member *m, const char *word)
-{
-    int row = 0;
-    while (m[row].word != NULL && strcmp(m[row].word, word) != 0)
-        row++;
-    return row;
-}
-
-int rubric_line(const struct rubric *r, const char *word)
-{
-    int line = r->lines[row_of(of_rubric, word)];
-    return line > 0 ? line : 1;
-}
-
-int rubric_line_of_image(const struct rubric_image *p, const char *word)
-{
-    int line = p->lines[row_of(of_image, word)];
-    return line > 0 ? line : p->line;
-}
-
-int rubric_line_of_check(const struct rubric_check *c, const char *word)
-{
-    int line = c->lines[row_of(of_check, word)];
-    return line > 0 ? line : c->line;
-}
-
 /* False: none of these statements. */
 static bool read_member(struct statement *s, const struct member *m, void *object, const char *word)
 {
-    const int at = row_of(m, word);
-    const uint32_t row = 1u << at;
-    uint32_t *given = &s->given[object != s->r];
-    m += at;
+    uint32_t row = 1, *given = &s->given[object != s->r];
+    int at = 0;
+    for (; m->word != NULL && strcmp(m->word, word) != 0; m++, at++)
+        row <<= 1;
     if (object == NULL || m->word == NULL)
         return false;
-    int *lines = object == s->r       ? s->r->lines
-                 : object == s->image ? s->image->lines
-                                      : s->check->lines;
-    lines[at] = lines[at] > 0 ? lines[at] : s->line;
+    struct rubric_line *line = object == s->r       ? &s->r->lines[at]
+                               : object == s->image ? &s->image->lines[at]
+                                                    : &s->check->lines[at];
+    if (line->word == NULL)
+        *line = (struct rubric_line){m->word, s->line};
     void *to = (char *)object + m->at;
     if (!m->many && *given & row)
         rubric_mistake(s->m, s->line, "a second '%s'", word);

@@ -52,11 +52,16 @@ struct rubric_set {
     char words[800]; /* "" of those by images */
 };
 
-/* The line of each statement of the whole, an image or a check, in the order of rubric.c's tables; 0: not given. */
+/* Where a statement of the whole, of an image or of a check stands; word NULL: it was not given. */
+struct rubric_line {
+    const char *word;
+    int line;
+};
 enum { RUBRIC_STATEMENTS = 20 };
 
 struct rubric_image {
-    int line, lines[RUBRIC_STATEMENTS];
+    int line;
+    struct rubric_line lines[RUBRIC_STATEMENTS];
     char name[48];
     char scene[256];                 /* as written: of the suite, or ending in .dae */
     const struct suite_scene *suite; /* NULL: a file beside the rubric */
@@ -77,7 +82,8 @@ struct margin {
 };
 
 struct rubric_check {
-    int line, lines[RUBRIC_STATEMENTS], part;
+    int line, part;
+    struct rubric_line lines[RUBRIC_STATEMENTS];
     char name[48];
     double points;
     enum check_kind kind;
@@ -111,7 +117,7 @@ struct rubric {
     struct rubric_image image[RUBRIC_IMAGES];
     struct rubric_check check[RUBRIC_CHECKS];
     int num_parts, num_images, num_checks;
-    int lines[RUBRIC_STATEMENTS];
+    struct rubric_line lines[RUBRIC_STATEMENTS];
     bool images;           /* what is handed in may be images alone */
     int variants, variant; /* how many there are, and which one this is, from 1; 0: none */
     int old_word_line;     /* the first that says "picture" for "image"; 0: none */
@@ -141,8 +147,9 @@ bool rubric_is_adaptive(const struct rubric_image *p);
 
 double rubric_points(const struct rubric *r);
 
-/* The line of a statement of a check, or of the check where it was not given. */
-int rubric_line_of_check(const struct rubric_check *c, const char *word);
+/* The line of a statement among `lines`, or `otherwise` where it was not given. */
+int rubric_line_of(const struct rubric_line lines[RUBRIC_STATEMENTS], const char *word,
+                   int otherwise);
 
 /* The file of an image's scene. */
 struct path rubric_scene(const struct rubric *r, const struct rubric_image *p);

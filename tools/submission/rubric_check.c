@@ -32,6 +32,15 @@ void rubric_mistake(struct rubric_mistakes *m, int line, const char *format, ...
     m->num++;
 }
 
+int rubric_line_of(const struct rubric_line lines[RUBRIC_STATEMENTS], const char *word,
+                   int otherwise)
+{
+    for (int i = 0; i < RUBRIC_STATEMENTS; i++)
+        if (lines[i].word != NULL && strcmp(lines[i].word, word) == 0)
+            return lines[i].line;
+    return otherwise;
+}
+
 double rubric_option(const struct rubric_image *p, const char *option, int k)
 {
     char words[300], with_spaces[16];
@@ -85,7 +94,7 @@ static void set_default(char *text, size_t size, const char *value)
 static void check_command(const struct rubric *r, struct rubric_mistakes *m)
 {
     const char *command = r->command;
-    const int line = rubric_line(r, "command");
+    const int line = rubric_line_of(r->lines, "command", LINE_WHOLE);
     static const char *const known[] = {"program", "scene",   "out",     "width",   "height", "spp",
                                         "lights",  "bounces", "threads", "options", "seed",   NULL};
     for (const char *c = strchr(command, '{'); c != NULL; c = strchr(c + 1, '{')) {
@@ -115,7 +124,7 @@ static void check_head(struct rubric *r, struct rubric_mistakes *m)
     set_default(r->output, sizeof r->output, "out.png");
     set_default(r->program, sizeof r->program, "pathtracer");
     if (!tone_curve_parse(r->curve, &curve, &e))
-        rubric_mistake(m, rubric_line(r, "curve"),
+        rubric_mistake(m, rubric_line_of(r->lines, "curve", LINE_WHOLE),
                        "curve '%s' is none of: srgb, linear, gamma=G, cgl", r->curve);
     const char *dot = strrchr(r->output, '.');
     if (dot == NULL || !is_word(dot, (const char *const[]){".png", ".exr", ".pfm", ".hdr", NULL}) ||
@@ -123,18 +132,18 @@ static void check_head(struct rubric *r, struct rubric_mistakes *m)
                          "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789._-")] !=
             '\0' ||
         r->output[0] == '.' || r->output[0] == '-')
-        rubric_mistake(m, rubric_line(r, "output"),
+        rubric_mistake(m, rubric_line_of(r->lines, "output", LINE_WHOLE),
                        "output '%s' is no file name ending in .png, .exr, .pfm or .hdr", r->output);
     if (r->program[0] == '/' || strstr(r->program, "..") != NULL)
-        rubric_mistake(m, rubric_line(r, "program"), "program '%s' is not inside the submission",
-                       r->program);
+        rubric_mistake(m, rubric_line_of(r->lines, "program", LINE_WHOLE),
+                       "program '%s' is not inside the submission", r->program);
     set_default(r->command, sizeof r->command,
                 "{program} -t {threads} -r {width} {height} -s {spp} -l {lights} -m {bounces} "
                 "{options} -f {out} {scene}");
     check_command(r, m);
     if (r->bugs[0] != '\0' && !is_beside(r, r->bugs))
-        rubric_mistake(m, rubric_line(r, "bugs"), "bugs: no directory '%s' beside the rubric",
-                       r->bugs);
+        rubric_mistake(m, rubric_line_of(r->lines, "bugs", LINE_WHOLE),
+                       "bugs: no directory '%s' beside the rubric", r->bugs);
 }
 
 static void check_golden(const struct rubric_image *p, const char *engine,
@@ -184,7 +193,7 @@ static void check_options(const struct rubric *r, const struct rubric_image *p,
     if (p->width == 0 || p->height == 0 || p->bounces < 0) /* which is another mistake */
         return;
     if (!are_ours(p, words, "", &e)) {
-        rubric_mistake(m, rubric_line_of_image(p, own ? "reference" : "options"),
+        rubric_mistake(m, rubric_line_of(p->lines, own ? "reference" : "options", p->line),
                        "image '%s': our renderer: %.100s%s", p->name, e.msg,
                        own ? "" : " (see 'reference ours SPP none')");
         return;
@@ -251,11 +260,11 @@ static void check_carried(const struct rubric *r, struct rubric_check *c, struct
     if (!c->carried.given)
         c->carried = (struct margin){.full = 0.15, .none = 0.5};
     else if (c->after < 0)
-        rubric_mistake(m, rubric_line_of_check(c, "carried"),
+        rubric_mistake(m, rubric_line_of(c->lines, "carried", c->line),
                        "check '%s': 'carried' needs 'after IMAGE'", c->name);
     if (c->after < 0)
         return;
-    const int line = rubric_line_of_check(c, "after");
+    const int line = rubric_line_of(c->lines, "after", c->line);
     if (c->kind != CHECK_EQUAL)
         rubric_mistake(m, line, "check '%s': 'after' is for 'equal'", c->name);
     else if (!is_of_earlier_part(r, c, c->after))
@@ -280,7 +289,7 @@ static void check_margins(const struct rubric_check *c, struct rubric_mistakes *
     for (size_t i = 0; c->kind != CHECK_GROWTH && i < sizeof of / sizeof *of; i++)
         if (of[i].margin->full >= 1)
             rubric_mistake(
-                m, rubric_line_of_check(c, of[i].name),
+                m, rubric_line_of(c->lines, of[i].name, c->line),
                 "check '%s': '%s': all points up to %g %%, black images too; margins are not in %%",
                 c->name, of[i].name, 100 * of[i].margin->full);
 }
@@ -392,6 +401,6 @@ void rubric_check_whole(struct rubric *r, const struct suite *suite, struct rubr
             rubric_mistake(m, r->part[i].line, "part '%s' has no checks", r->part[i].number);
     }
     if (r->total > 0 && fabs(rubric_points(r) - r->total) > 1e-9)
-        rubric_mistake(m, rubric_line(r, "total"), "the checks add up to %g points, not to %g",
-                       rubric_points(r), r->total);
+        rubric_mistake(m, rubric_line_of(r->lines, "total", LINE_WHOLE),
+                       "the checks add up to %g points, not to %g", rubric_points(r), r->total);
 }

@@ -7,10 +7,6 @@
 void rubric_mistake(struct rubric_mistakes *m, int line, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 
-/* The line of a statement of the whole or of an image; where it was not given line 1, or that of the image. */
-int rubric_line(const struct rubric *r, const char *word);
-int rubric_line_of_image(const struct rubric_image *p, const char *word);
-
 /* Reports what is missing or does not fit together, once all lines are read, and sets defaults,
  * image.suite and set[]. */
 void rubric_check_whole(struct rubric *r, const struct suite *suite, struct rubric_mistakes *m);

@@ -89,8 +89,8 @@ TEST(what_is_carried_on)
     assert_int_equal(mistakes.num, 0);
     assert_int_equal(rubric->check[0].after, -1);
     assert_int_equal(rubric->check[1].after, 0);
-    assert_int_equal(rubric_line_of_check(&rubric->check[1], "after"), 16);
-    assert_int_equal(rubric_line_of_check(&rubric->check[1], "hint"), 13);
+    assert_int_equal(rubric_line_of(rubric->check[1].lines, "after", rubric->check[1].line), 16);
+    assert_int_equal(rubric_line_of(rubric->check[1].lines, "hint", rubric->check[1].line), 13);
     assert_true(rubric->check[1].carried.full == 0.15 && rubric->check[1].carried.none == 0.5);
 }
 
