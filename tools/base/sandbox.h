@@ -62,8 +62,8 @@ struct sandbox_job {
                      * the tree has of these names is removed before the run */
     bool keep_tree; /* also everything in /box, as "tree.tar" */
     bool tools;     /* a build: it sees all of /usr */
-    const char *
-        cache; /* directory of ccache, which then wraps the compilers; read-only; NULL: no ccache */
+    const char
+        *cache; /* directory of ccache, which then wraps the compilers; read-only; NULL: no ccache */
     bool fill_cache;     /* the cache is made if need be and is writable */
     const char *library; /* LD_LIBRARY_PATH; NULL: none */
     const char *out;     /* directory that receives what is kept; made if need be */

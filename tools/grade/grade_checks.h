@@ -80,10 +80,10 @@ struct submitted_images {
     char why[RUBRIC_IMAGES][400];                /* why not */
     bool can_buy;              /* further runs are possible: what is too noisy stays undecided */
     bool fixed[RUBRIC_IMAGES]; /* but not of this image, whose noise does not fall with samples */
-    char no_more[RUBRIC_IMAGES]
-                [160];       /* why no further run of it is made; "": the budget is used up */
-    int runs[RUBRIC_IMAGES]; /* number of runs of it, whether they count or not */
-    double bought_s;         /* CPU time of further runs */
+    /* Why no further run of it is made; "": the budget is used up. */
+    char no_more[RUBRIC_IMAGES][160];
+    int runs[RUBRIC_IMAGES];   /* number of runs of it, whether they count or not */
+    double bought_s;           /* CPU time of further runs */
 };
 
 /* What a submission is judged by, and its images. */

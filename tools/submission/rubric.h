@@ -42,8 +42,7 @@ extern const char *const rubric_reference_names[]; /* "none", "truth", ... */
 struct accepted {
     int line;
     char name[48];
-    char how
-        [256]; /* options of our renderer (of an image: if they begin with -), or a moments file */
+    char how[256]; /* options of our renderer (of an image: if they begin with -), or a moments file */
 };
 
 /* A set of accepted deviations that a program may have all at once. The first set is empty. */

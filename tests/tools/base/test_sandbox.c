@@ -188,8 +188,7 @@ TEST(a_hang_ends_with_all_its_processes)
     must_do(fs_path("sleep 0.5; ! grep -qs [9]8765.%d /proc/[0-9]*/cmdline", getpid()));
 }
 
-/* The kernel looks at its clock ticks, which a busy host may withhold from a virtual machine for a second or two, and
- * the time of the sandbox's own start is counted too: 2.5 s have been seen. Without the limit it is 60 s. */
+/* What a run had used when it was killed, and the file by which that is known is gone. Control: one that slept. */
 TEST(a_killed_run_has_used_time)
 {
     if (in != &box)
@@ -201,10 +200,12 @@ TEST(a_killed_run_has_used_time)
     assert_int_equal(busy.end, SANDBOX_WALL);
     assert_int_equal(idle.end, SANDBOX_WALL);
     printf("busy for 3 s: %.2f CPU s; idle: %.2f\n", busy.cpu_s, idle.cpu_s);
-    assert_true(busy.cpu_s > 0.5 && busy.cpu_s < 4 && idle.cpu_s < 0.3);
+    assert_true(busy.cpu_s > 0.5 && busy.cpu_s < 4 && idle.cpu_s < busy.cpu_s / 2);
     assert_true(access(fs_path("%s/.cpu", out.s).s, F_OK) != 0);
 }
 
+/* The kernel looks at its clock ticks, which a busy host may withhold from a virtual machine for a second or two, and
+ * the time of the sandbox's own start is counted too: 2.5 s have been seen. Without the limit it is 60 s. */
 TEST(a_busy_loop_ends_by_processor_time)
 {
     struct sandbox_limits limit = small;
@@ -490,7 +491,6 @@ TEST(a_tree_goes_from_one_run_to_the_next)
     assert_false(too_large);
 }
 
-/* The unsafe mode, only on request: time and file size are bounded, the rest is open. */
 /* An image that was handed in under the output's name was not made by the run; a file of another name stays. */
 TEST(what_was_there_is_no_output)
 {
@@ -501,6 +501,7 @@ TEST(what_was_there_is_no_output)
     assert_string_equal(kept("second"), "old\n");
 }
 
+/* The unsafe mode, only on request: time and file size are bounded, the rest is open. */
 TEST(unsafe_is_as_unsafe_as_it_says)
 {
     struct sandbox s;
