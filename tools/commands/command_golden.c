@@ -40,7 +40,9 @@ static const struct cli_option options[] = {
      TO(suite_dir)},
     {0, "new", "", "also approve candidates for which no reference is stored", TO(opt.accept_new)},
     {0, "accept-difference", "WHY",
-     "also approve candidates that are DIFFERENT; the manifest records WHY", TO(opt.why)},
+     "also approve candidates that are DIFFERENT, or INCONCLUSIVE with at least\n"
+     "twice the samples of what is stored; the manifest records WHY",
+     TO(opt.why)},
     {0, "alpha", "A", "probability of any wrong verdict in this run (1e-3)", TO(opt.alpha), 1e-12,
      0.4},
     {'h', "help", "", "print this", TO(help),
@@ -120,8 +122,7 @@ static bool print_orphans(const char *dir, const struct suite *suite, size_t *nu
     *num = 0;
     if (!golden_orphans(dir, suite, &names, e))
         return false;
-    json_object_foreach(names, name, value)
-    {
+    json_object_foreach(names, name, value) {
         if ((*num)++ == 0)
             *first = fs_path("%s", name);
         printf("%-8s %s/%s: not in the suite\n", "orphan", dir, name);
@@ -159,7 +160,7 @@ static int status(const struct settings *s, const struct suite *suite, struct er
     return EXIT_NOT_JUDGED;
 }
 
-/* The command that would accept what was refused as DIFFERENT. */
+/* The command that would accept what was refused for want of a reason. */
 static void print_command(const struct settings *s, const struct suite_scene *scene,
                           const struct suite_reference *ref)
 {
@@ -197,11 +198,11 @@ static int approve_all(const struct settings *s, const struct suite *suite, stru
         enum approval done = approve(&opt, scene, ref, stdout, &why);
         if (done == APPROVE_IMPOSSIBLE)
             printf("  refused: %s\n", why.msg);
-        if (done == APPROVE_DIFFERENT)
+        if (done == APPROVE_DIFFERENT || done == APPROVE_BETTER)
             print_command(s, scene, ref);
         if (done == APPROVE_IMPOSSIBLE && count[done] == 0)
             *e = why;
-        count[done]++;
+        count[done == APPROVE_BETTER ? APPROVE_INCONCLUSIVE : done]++;
     }
     for (int i = 0; i < suite->num_scenes; i++)
         if (is_selected(s, &suite->scene[i], "noise"))

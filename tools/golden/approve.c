@@ -1,9 +1,15 @@
 #include "approve.h"
 
+#include "reference/base/json_node.h"
 #include "reference/base/utc_date.h"
 #include "tools/compare/region.h"
+#include "tools/validate/pair_noise.h"
 
 #include <string.h>
+
+/* An undecided candidate may replace what is stored if it has this many times its samples: then most of the noise left
+ * is that of what is stored, and no other candidate could do better. */
+static const double better = 2;
 
 static const char *text_of(const json_t *entry, const char *key)
 {
@@ -120,14 +126,57 @@ static enum approval approve_incomparable(const struct pair *p, struct err *e)
     return accept(p, "NOT COMPARABLE", json_pack("{s:s}", "why", p->opt->why), e);
 }
 
-/* Compares candidate (A) with stored (B), with the margins of the suite. */
+/* Compares candidate (A) with stored (B), with the margins of the suite. Single images of unknown noise get that of
+ * their difference. */
 static bool compare(const struct pair *p, struct comparison *out, struct err *e)
 {
+    const struct moments *a = &p->candidate.m, *b = &p->stored.m;
     const struct compare_options co = {.alpha = p->opt->alpha,
                                        .margin_global = p->ref->margin_global,
                                        .margin_tile = p->ref->margin_tile,
                                        .tile = p->scene->tile};
-    return compare_moments(&p->candidate.m, &p->stored.m, &co, out, e);
+    if (!pair_noise_is_unknown(a, b) || a->width != b->width || a->height != b->height)
+        return compare_moments(a, b, &co, out, e);
+    struct moments estimated[2];
+    bool ok = pair_noise_estimate(a, b, estimated, e) &&
+              compare_moments(&estimated[0], &estimated[1], &co, out, e);
+    moments_free(&estimated[0]);
+    moments_free(&estimated[1]);
+    return ok;
+}
+
+static double samples_of(const struct golden *g)
+{
+    return member_number(g->manifest, "spp") * member_number(g->manifest, "replicates");
+}
+
+/* Undecided: if the candidate has more samples, a person can say why it may replace what is stored. Else says what
+ * would help: `factor` times the samples on both sides would decide, of which those stored are what they are. */
+static enum approval refuse_undecided(const struct pair *p, double factor)
+{
+    const double times = samples_of(&p->candidate) / samples_of(&p->stored); /* NAN if unknown */
+    const struct moments *a = &p->candidate.m, *b = &p->stored.m;
+    if (times >= better) {
+        fprintf(p->out,
+                "  refused: undecided, though the candidate has %.3g times the samples of what is "
+                "stored: to let it replace that, give --accept-difference \"why\"\n",
+                times);
+        return APPROVE_BETTER;
+    }
+    const double share = pair_noise_share(a, b), left = 1 / factor - (1 - share);
+    if (!pair_noise_is_unknown(a, b) && left * verdict_largest_factor > share)
+        fprintf(p->out,
+                "  refused: about %.1f times the replicates of the candidate would decide\n",
+                share / left);
+    else
+        fprintf(
+            p->out,
+            "  refused: too much of the noise is that of what is stored: render a candidate "
+            "with at least %g times its samples (it has %g replicates of %g), which may replace "
+            "it for a reason that you give\n",
+            better, member_number(p->stored.manifest, "replicates"),
+            member_number(p->stored.manifest, "spp"));
+    return APPROVE_INCONCLUSIVE;
 }
 
 static enum approval approve_compared(const struct pair *p, struct err *e)
@@ -138,7 +187,7 @@ static enum approval approve_compared(const struct pair *p, struct err *e)
         return APPROVE_IMPOSSIBLE;
     }
     const struct region *g = &r.global[3];
-    char image[32], tile[32], more[128];
+    char image[32], tile[32];
     fprintf(p->out, "  %s: %s\n", verdict_name(r.verdict), r.reason);
     fprintf(p->out,
             "  difference %+.4f %% [%+.4f, %+.4f], smallest detectable: image %s, tile %s; margins "
@@ -146,16 +195,16 @@ static enum approval approve_compared(const struct pair *p, struct err *e)
             100 * g->difference, 100 * g->ci_lo, 100 * g->ci_hi,
             region_mdb_text(r.mdb_global, image), region_mdb_text(r.mdb_tile, tile),
             100 * p->ref->margin_global, 100 * p->ref->margin_tile);
+    const bool undecided = !verdict_decides(r.verdict), equal = r.verdict == VERDICT_EQUIVALENT;
     enum approval done;
-    if (!verdict_decides(r.verdict)) {
-        verdict_more_samples(r.extra_factor, "replicates", more);
-        fprintf(p->out, "  refused: %s\n", more);
-        done = APPROVE_INCONCLUSIVE;
-    } else if (r.verdict == VERDICT_DIFFERENT && p->opt->why == NULL) {
+    if (undecided &&
+        (p->opt->why == NULL || !(samples_of(&p->candidate) >= better * samples_of(&p->stored)))) {
+        done = refuse_undecided(p, r.extra_factor);
+    } else if (!equal && p->opt->why == NULL) {
         done = refuse_difference(p);
     } else {
         json_t *change = effect_json(&r, p->opt->alpha);
-        if (r.verdict == VERDICT_DIFFERENT)
+        if (!equal)
             json_object_set_new(change, "why", json_string(p->opt->why));
         done = accept(p, verdict_name(r.verdict), change, e);
     }

@@ -12,7 +12,8 @@ struct approve_options {
     const char *from_dir, *golden_dir; /* both laid out as by golden_write() */
     double alpha;                      /* of one comparison's verdict */
     bool accept_new;                   /* where nothing is stored */
-    const char *why;                   /* accept a difference for this reason; NULL: refuse it */
+    const char *why; /* accept for this reason a difference, or an undecided candidate with at
+                      * least twice the samples of what is stored; NULL: refuse it */
 };
 
 enum approval {
@@ -20,6 +21,7 @@ enum approval {
     APPROVE_UNCHANGED,    /* nothing to do */
     APPROVE_DIFFERENT,    /* refused: DIFFERENT, and no reason given */
     APPROVE_INCONCLUSIVE, /* refused, whatever the options */
+    APPROVE_BETTER,       /* refused: undecided, with twice the samples, and no reason given */
     APPROVE_IMPOSSIBLE /* refused: no candidate, a damaged one, or nothing to compare with; e says */
 };
 
@@ -28,7 +30,7 @@ enum approval {
  *
  * What is accepted goes into golden_dir as golden_write() does it; its manifest entry carries
  * "changes", oldest first, one for each approval: {"date", "verdict": "NEW", "IDENTICAL",
- * "EQUIVALENT", "DIFFERENT" or "NOT COMPARABLE" (of another size), and where they apply "why",
+ * "EQUIVALENT", "DIFFERENT", "INCONCLUSIVE" or "NOT COMPARABLE" (of another size), and where they apply "why",
  * "difference", "ci", "mdb_global", "mdb_tile", "alpha", "was": {version, seed, scene_sha256,
  * exr_sha256, date}}. */
 enum approval approve(const struct approve_options *opt, const struct suite_scene *scene,

@@ -1,5 +1,6 @@
 /* Takes one look at a claim, decides it, and writes its row of results.json with the maps (z,
  * relative). */
+#include "pair_noise.h"
 #include "validate_internal.h"
 #include "renderer/base/fs.h"
 #include "tools/base/data_dirs.h"
@@ -8,7 +9,6 @@
 #include "tools/results/claim_result.h"
 #include "tools/results/noise_results.h"
 #include "tools/results/stated_error_results.h"
-#include "tools/stats/noise_estimate.h"
 #include "tools/results/results.h"
 
 #include <stdio.h>
@@ -255,30 +255,6 @@ static void pair_free(struct pair *p)
     moments_free(&p->estimated[1]);
 }
 
-/* Copies both means and estimates their noise from A - B; images that are the same to the bit (an unchanged program
- * without seeds) count as exact. */
-static bool estimate(struct pair *p, struct err *e)
-{
-    struct noise_estimate found;
-    struct moments *m = p->estimated;
-    pair_free(p);
-    for (int k = 0; k < 2; k++)
-        if (!moments_alloc(&m[k], p->image[k]->m.width, p->image[k]->m.height, e))
-            return false;
-    p->is_estimated = true;
-    size_t values = 3 * (size_t)m[0].width * (size_t)m[0].height;
-    for (int k = 0; k < 2; k++)
-        memcpy(m[k].mean, p->image[k]->m.mean, values * sizeof *m[k].mean);
-    if (memcmp(m[0].mean, m[1].mean, values * sizeof *m[0].mean) != 0)
-        return noise_estimate_variance(&m[0], &m[1], NULL, NULL, NULL, &found, e);
-    for (int k = 0; k < 2; k++) {
-        strcpy(m[k].unit, "exact");
-        for (size_t i = 0; i < values / 3; i++)
-            m[k].n[i] = 1;
-    }
-    return true;
-}
-
 static bool one_of(struct pair *p, struct side *s, int stage, struct side_image **image,
                    struct err *e)
 {
@@ -298,26 +274,15 @@ static bool both_of(void *ctx, int stage, const struct moments **a, const struct
         return false;
     *a = &p->image[0]->m;
     *b = &p->image[1]->m;
-    if (!moments_noise_is_unknown(*a) && !moments_noise_is_unknown(*b))
+    if (!pair_noise_is_unknown(*a, *b))
         return true;
-    if (!estimate(p, e))
+    pair_free(p);
+    p->is_estimated = true;
+    if (!pair_noise_estimate(*a, *b, p->estimated, e))
         return false;
     *a = &p->estimated[0];
     *b = &p->estimated[1];
     return true;
-}
-
-/* The share of side a in the variance of the difference, summed over pixels and channels. */
-static double noise_share(const struct claim_run *t)
-{
-    double sum[2] = {0, 0};
-    for (int k = 0; k < 2; k++) {
-        const struct moments *m = &t->seen[k]->m;
-        for (size_t p = 0; p < (size_t)m->width * (size_t)m->height; p++)
-            for (int c = 0; c < 3; c++)
-                sum[k] += moments_var_of_mean(m, p, c);
-    }
-    return sum[0] + sum[1] > 0 ? sum[0] / (sum[0] + sum[1]) : 1;
 }
 
 /* Below this share of our noise, more samples of ours gain nothing against a stored reference. */
@@ -363,7 +328,7 @@ static void look(struct validation *v, struct claim_run *t)
     else if (t->next == NUM_LOOKS)
         finish(v, t, t->looks == &alpha_spending_single ? NULL : "all looks are taken");
     else if (t->look >= LOOK_DECLARED && t->b->kind == SIDE_GOLDEN &&
-             noise_share(t) < least_noise_share)
+             pair_noise_share(&t->seen[0]->m, &t->seen[1]->m) < least_noise_share)
         finish(v, t, "the noise left is that of the stored reference");
 }
 

@@ -15,6 +15,7 @@ struct fixture {
     struct suite_scene scene;
     struct suite_reference ref;
     struct approve_options opt;
+    bool is_noisy;   /* render() writes single images of unknown noise */
     char said[4096]; /* what the last approve() printed */
     struct err e;
 };
@@ -55,20 +56,34 @@ static int teardown(void **state)
     return 0;
 }
 
+static void render_many(struct fixture *f, const char *dir, double scale, int replicates,
+                        uint64_t seed)
+{
+    OWN(moments) m = new_moments(f->scene.width, f->scene.height, "replicate");
+    simulate(&m, LAW_NORMAL, scale, replicates, true, &seed);
+    m.spp = 4;
+    if (f->is_noisy) {
+        size_t pixels = (size_t)m.width * (size_t)m.height;
+        strcpy(m.unit, "picture");
+        memset(m.m2, 0, 3 * pixels * sizeof *m.m2);
+        memset(m.m3, 0, 3 * pixels * sizeof *m.m3);
+        for (size_t p = 0; p < pixels; p++)
+            m.n[p] = 3;
+    }
+    json_auto_t *manifest = json_pack(
+        "{ss,ss,ss,ss,si,si,si,si,si,si,sI,ss,ss,s[I]}", "scene", "12_plane", "scene_sha256",
+        f->scene.sha256, "engine", f->ref.engine, "unit", m.unit, "width", m.width, "height",
+        m.height, "depth", 5, "replicates", replicates, "spp", 4, "subgrid", 0, "seed",
+        (json_int_t)seed, "version", "Blender 3.4.1", "key", "k", "seeds", (json_int_t)77);
+    struct err e;
+    MUST(golden_write(dir, "12_plane", f->ref.engine, &m, manifest, &e));
+}
+
 /* Writes a reference of mean `scale` into a directory; noise of 30 % in each of 16 replicates, so one
  * standard error of the image is 0.12 %, of a tile 0.5 %. */
 static void render(struct fixture *f, const char *dir, double scale, uint64_t seed)
 {
-    OWN(moments) m = new_moments(f->scene.width, f->scene.height, "replicate");
-    simulate(&m, LAW_NORMAL, scale, REPLICATES, true, &seed);
-    m.spp = 4;
-    json_auto_t *manifest = json_pack(
-        "{ss,ss,ss,ss,si,si,si,si,si,si,sI,ss,ss,s[I]}", "scene", "12_plane", "scene_sha256",
-        f->scene.sha256, "engine", f->ref.engine, "unit", "replicate", "width", m.width, "height",
-        m.height, "depth", 5, "replicates", REPLICATES, "spp", 4, "subgrid", 0, "seed",
-        (json_int_t)seed, "version", "Blender 3.4.1", "key", "k", "seeds", (json_int_t)77);
-    struct err e;
-    MUST(golden_write(dir, "12_plane", f->ref.engine, &m, manifest, &e));
+    render_many(f, dir, scale, REPLICATES, seed);
 }
 
 static enum approval run(struct fixture *f)
@@ -247,6 +262,60 @@ TEST_OF(fixture, an_inconclusive_one_is_refused_whatever_is_said, setup, teardow
     f->opt.accept_new = true;
     f->opt.why = "I want it";
     assert_refused(f, APPROVE_INCONCLUSIVE, "INCONCLUSIVE");
+}
+
+/* The same with more replicates: refused with what would help, until it has twice the samples and a reason is given. */
+TEST_OF(fixture, an_undecided_one_with_twice_the_samples_may_replace_a_noisy_one, setup, teardown)
+{
+    render(f, f->golden, 1, 1);
+    f->ref.margin_global = 0.001;
+    f->ref.margin_tile = 0.004;
+    f->opt.why = "the stored one is too noisy";
+    f->ref.replicates = 24;
+    render_many(f, f->from, 1, 24, 2);
+    assert_refused(f, APPROVE_INCONCLUSIVE,
+                   "at least 2 times its samples (it has 16 replicates of 4)");
+    f->ref.replicates = 40;
+    render_many(f, f->from, 1, 40, 2);
+    f->opt.why = NULL;
+    assert_refused(f, APPROVE_BETTER, "the candidate has 2.5 times the samples");
+    f->opt.why = "the stored one is too noisy";
+    assert_accepted(f, 1, "INCONCLUSIVE");
+    json_auto_t *change = last_change(f, 1);
+    assert_string_equal(json_string_value(json_object_get(change, "why")), f->opt.why);
+    f->opt.why = NULL; /* many more samples do not excuse a difference */
+    f->ref.replicates = 400;
+    render_many(f, f->from, 1.1, 400, 3);
+    assert_refused(f, APPROVE_DIFFERENT, "--accept-difference");
+}
+
+/* What is stored has 64 times the replicates: more of the candidate's decide. */
+TEST_OF(fixture, an_undecided_one_is_told_how_many_replicates_it_takes, setup, teardown)
+{
+    render_many(f, f->golden, 1, 1024, 1);
+    render(f, f->from, 1, 2);
+    f->ref.margin_global = 0.003;
+    f->ref.margin_tile = 0.012;
+    assert_refused(f, APPROVE_INCONCLUSIVE, "times the replicates of the candidate would decide");
+}
+
+/* Single images of unknown noise, as of a program without seeds: 7.5 % in each pixel of both, which must not pass for a
+ * difference; 20 % does. */
+TEST_OF(fixture, the_noise_of_single_images_counts, setup, teardown)
+{
+    f->is_noisy = true;
+    render(f, f->golden, 1, 1);
+    render(f, f->from, 1, 2);
+    assert_int_equal(compared(f), VERDICT_EQUIVALENT);
+    assert_accepted(f, 1, "EQUIVALENT");
+    json_auto_t *change = last_change(f, 1);
+    json_t *ci = json_object_get(change, "ci");
+    /* At least two standard errors of 7.5 % sqrt(2) / 64 to each side. */
+    assert_true(json_number_value(json_array_get(ci, 1)) -
+                    json_number_value(json_array_get(ci, 0)) >
+                0.0066);
+    render(f, f->from, 1.2, 3);
+    assert_refused(f, APPROVE_DIFFERENT, "--accept-difference");
 }
 
 TEST_OF(fixture, what_is_missing_or_damaged_is_refused, setup, teardown)
