@@ -41,7 +41,7 @@ static const struct cli_option options[] = {
     {0, "new", "", "also approve candidates for which no reference is stored", TO(opt.accept_new)},
     {0, "accept-difference", "WHY",
      "also approve candidates that are DIFFERENT, or INCONCLUSIVE with at least\n"
-     "twice the samples of what is stored; the manifest records WHY",
+     "1.25 times the samples of what is stored; the manifest records WHY",
      TO(opt.why)},
     {0, "alpha", "A", "probability of any wrong verdict in this run (1e-3)", TO(opt.alpha), 1e-12,
      0.4},

@@ -7,9 +7,9 @@
 
 #include <string.h>
 
-/* An undecided candidate may replace what is stored if it has this many times its samples: then most of the noise left
- * is that of what is stored, and no other candidate could do better. */
-static const double better = 2;
+/* An undecided candidate may replace what is stored if it has this many times its samples: then more than half of the
+ * noise left is that of what is stored, which no candidate can do anything about. */
+static const double better = 1.25;
 
 static const char *text_of(const json_t *entry, const char *key)
 {

@@ -13,7 +13,7 @@ struct approve_options {
     double alpha;                      /* of one comparison's verdict */
     bool accept_new;                   /* where nothing is stored */
     const char *why; /* accept for this reason a difference, or an undecided candidate with at
-                      * least twice the samples of what is stored; NULL: refuse it */
+                      * least 1.25 times the samples of what is stored; NULL: refuse it */
 };
 
 enum approval {
@@ -21,7 +21,7 @@ enum approval {
     APPROVE_UNCHANGED,    /* nothing to do */
     APPROVE_DIFFERENT,    /* refused: DIFFERENT, and no reason given */
     APPROVE_INCONCLUSIVE, /* refused, whatever the options */
-    APPROVE_BETTER,       /* refused: undecided, with twice the samples, and no reason given */
+    APPROVE_BETTER,       /* refused: undecided, with more samples, and no reason given */
     APPROVE_IMPOSSIBLE /* refused: no candidate, a damaged one, or nothing to compare with; e says */
 };
 

@@ -3,8 +3,8 @@
 #include "report_internal.h"
 
 #include "tools/compare/region.h"
-#include "tools/compare/verdict.h"
 #include "tools/html/html.h"
+#include "tools/results/plain_words.h"
 
 #include <math.h>
 #include <string.h>
@@ -86,11 +86,9 @@ static void write_regions(FILE *f, const json_t *claim)
               : "none",
           f);
     fact_close(f);
-    if (member_number(claim, "extra_factor") > 1) {
-        char more[128];
-        verdict_more_samples(member_number(claim, "extra_factor"), "samples", more);
-        write_fact(f, "More samples", "%s", more);
-    }
+    const struct plain_words more = plain_words_more_samples(claim);
+    if (more.s[0] != '\0')
+        write_fact(f, "More samples", "%s", more.s);
 }
 
 static void write_optional_number(FILE *f, const json_t *claim, const char *name,

@@ -74,6 +74,36 @@ static struct plain_words on_scene(const json_t *claim)
     return w;
 }
 
+static double replicates(const json_t *claim, const char *unit, const char *n, double times)
+{
+    return strcmp(member_or_empty(claim, unit), "replicate") == 0
+               ? ceil(times * member_number(claim, n))
+               : 0;
+}
+
+/* extra_factor is about both sides. Where the reference has little of the noise, more samples of A alone do the same. */
+struct plain_words plain_words_more_samples(const json_t *claim)
+{
+    struct plain_words w = {""};
+    const double factor = member_number(claim, "extra_factor");
+    const json_t *share = json_object_get(claim, "noise_share_a");
+    const double a = share != NULL ? json_number_value(share) : 1, left = 1 / factor - (1 - a);
+    const bool both = left * 2 * factor < a, in_words = factor >= verdict_largest_factor;
+    const double times = both || in_words ? factor : a / left;
+    char more[128];
+    if (!(factor > 1)) /* 1: nobody knows */
+        return w;
+    verdict_more_samples(times, both ? "samples on both sides" : "samples", more);
+    const double num_a = in_words ? 0 : replicates(claim, "unit_a", "n_a", times),
+                 num_b = both ? replicates(claim, "unit_b", "n_b", times) : 0;
+    size_t at = (size_t)snprintf(w.s, sizeof w.s, "%s", more);
+    if (num_a > 0)
+        at += (size_t)snprintf(w.s + at, sizeof w.s - at, ": %.0f replicates", num_a);
+    if (num_a > 0 && num_b > 0)
+        snprintf(w.s + at, sizeof w.s - at, ", and %.0f of the reference", num_b);
+    return w;
+}
+
 struct plain_words plain_words_claim(const json_t *claim)
 {
     struct plain_words w;
@@ -91,12 +121,9 @@ struct plain_words plain_words_claim(const json_t *claim)
         snprintf(w.s, sizeof w.s, "%.100s is the same%.110s (as %.100s), within %.3g %%", a,
                  scene.s, b, 100 * member_number(claim, "margin_global"));
     else if (strcmp(verdict, "INCONCLUSIVE") == 0) {
-        const double factor = member_number(claim, "extra_factor"); /* 1: nobody knows */
-        char more[128] = "";
-        if (factor > 1)
-            verdict_more_samples(factor, "samples", more);
-        snprintf(w.s, sizeof w.s, "%.100s is too noisy to tell%.110s (against %.100s)%s%s", a,
-                 scene.s, b, factor > 1 ? ": " : "", more);
+        const struct plain_words more = plain_words_more_samples(claim);
+        snprintf(w.s, sizeof w.s, "%.100s is too noisy to tell%.110s (against %.100s)%s%.200s", a,
+                 scene.s, b, more.s[0] != '\0' ? ": " : "", more.s);
     } else
         snprintf(
             w.s, sizeof w.s,

@@ -16,6 +16,10 @@ struct plain_words {
  * undecided or not judged. */
 struct plain_words plain_words_claim(const json_t *claim);
 
+/* What would decide an undecided claim, "about 2.5 times the samples would decide: 40 replicates"; says so if the
+ * reference needs more, too. Empty where nobody knows. */
+struct plain_words plain_words_more_samples(const json_t *claim);
+
 /* The three lines at the end of a run: what was judged, the result, and where to look (page: path of the report). */
 void plain_words_print(FILE *f, const json_t *results, const char *page);
 

@@ -115,6 +115,8 @@ static void add_provenance(json_t *claim, const struct validation *v, const stru
                                       a->rays.primitive_tests));
     if (a->manifest == NULL)
         json_object_set_new(claim, "seed_a", json_integer((json_int_t)v->opt->seed));
+    if (!pair_noise_is_unknown(&a->m, &b->m))
+        json_object_set_new(claim, "noise_share_a", json_real(pair_noise_share(&a->m, &b->m)));
     json_t *version = json_object_get(b->manifest, "version");
     json_t *seeds = json_object_get(b->manifest, "seeds");
     if (version != NULL)

@@ -59,6 +59,32 @@ TEST(who_how_much_and_where)
         "no difference of mine was found on 12_point_plane (against truth); 1.23 % would have been");
 }
 
+/* extra_factor 2.5 is of both sides. Where a share s of the variance is that of A, A alone needs s/(1/2.5 - (1 - s)) times
+ * its samples: 3 for s = 0.9. Where it needs more than twice as many as
+ * it would together with B, both are named. */
+static void assert_more(double share, const char *sentence)
+{
+    json_auto_t *c = claim_of("INCONCLUSIVE", "EQUIVALENT", 0, 0, 0, 3);
+    json_object_set_new(c, "noise_share_a", json_real(share));
+    assert_string_equal(plain_words_more_samples(c).s, sentence);
+    json_object_update_new(c, json_pack("{ss sf ss sf}", "unit_a", "replicate", "n_a", 15.,
+                                        "unit_b", "replicate", "n_b", 31.));
+    assert_non_null(strstr(plain_words_claim(c).s, sentence));
+    assert_non_null(strstr(plain_words_claim(c).s, share < 0.8
+                                                       ? ": 38 replicates, and 78 of the reference"
+                                                   : share < 1 ? ": 45 replicates"
+                                                               : ": 38 replicates"));
+    assert_int_equal(strstr(plain_words_claim(c).s, "of the reference") != NULL, share < 0.8);
+}
+
+TEST(whose_samples_would_decide)
+{
+    assert_more(1, "about 2.5 times the samples would decide");
+    assert_more(0.9, "about 3.0 times the samples would decide");
+    assert_more(0.5, "about 2.5 times the samples on both sides would decide");
+    assert_more(0.7, "about 2.5 times the samples on both sides would decide");
+}
+
 static char *printed(json_t *claims)
 {
     char *text = NULL;
