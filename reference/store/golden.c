@@ -251,9 +251,8 @@ void golden_inspect(const char *golden_dir, const struct suite_scene *scene,
     struct err stale = {0};
     if (!json_is_object(entry)) {
         out->state = GOLDEN_MISSING;
-        err_set(e, "%s: no golden of %s: `%s` makes it", at.exr.s, ref->engine,
-                engine_with_goldens(ref->engine) != NULL ? "make golden"
-                                                         : "assay golden render --engine FILE");
+        err_set(e, "%s: no golden of %s%s", at.exr.s, ref->engine,
+                engine_with_goldens(ref->engine) != NULL ? ": `make golden` makes it" : "");
     } else {
         bool fits = check_entry(entry, scene, ref, where, &stale);
         if (read_pair(image_of(entry, at.exr.s, at.next.s), entry, &out->m, e)) {

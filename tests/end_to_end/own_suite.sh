@@ -49,6 +49,22 @@ tell "validate says where it looked" "$(grep -qx "suite $tmp/free/begun (1 scene
 expect "goldens are current" 0 "current  cornell/mine-1.0" env -C begun assay golden status
 again=$(python3 -c "import json; print(json.load(open('report/results.json'))['claims'][0]['rerun'])")
 expect "the command of a claim runs as it is printed" 0 "result: all as it should be" bash -c "$again"
+# Printed commands are for whoever reads the page, in whatever folder.
+mkdir elsewhere
+expect "in another folder, too" 0 "result: all as it should be, 1 the same" env -C elsewhere bash -c "$again"
+expect "validate in the folder itself" 0 "result: all as it should be, 1 the same" env -C begun assay validate -q --out "$tmp/free/report"
+again=$(python3 -c "import json; print(json.load(open('report/results.json'))['claims'][0]['rerun'])")
+expect "whose commands run in another folder, too" 0 "result: all as it should be, 1 the same" env -C elsewhere bash -c "$again"
+anew=$(python3 - report/index.html <<'END'
+import html, re, sys
+print(html.unescape(re.search("<code>(assay golden render[^<]*)</code>", open(sys.argv[1]).read()).group(1)))
+END
+)
+expect "so do those that make the reference anew" 0 "IDENTICAL: the same bits" env -C elsewhere bash -ec "$anew"
+cp -r begun "without it" && rm -r "without it/golden"
+env -C "without it" assay validate -q >/dev/null 2>elsewhere/said
+expect "and those on what is missing, which is then there" 0 "1 approved" env -C elsewhere bash -ec "$(sed -n 's/.*no golden of mine-1.0: //p' elsewhere/said)"
+expect "control: it is" 0 "result: all as it should be, 1 the same" assay validate -q --suite "without it" --out report
 expect "outside a suite ours are looked for where they are installed" 3 "no scene 'x' in .*/share/assay/scenes" assay validate --only x
 
 expect "an engine that reads scenes of its own is not given ours" 3 'mine.json is for a suite of its own.*: give --suite DIR' assay validate -q --engine begun/mine.json
@@ -77,7 +93,8 @@ cat >many/suite.json <<'END'
 }
 END
 cd many || exit 1
-expect "a reference that is missing is named, with what makes it" 3 "no golden of closed: \`assay golden render --engine FILE\` makes it" assay validate -q --only furnace
+expect "golden render has its name in its help" 0 "usage: assay golden render" assay golden render --help
+expect "a reference that is missing is named, with what makes it" 3 "no golden of closed: render it with the file that describes what makes it (golden render --engine FILE --as closed)" assay validate -q --only furnace
 expect "a closed form is stored" 0 "furnace/closed.exr: 16 x 16 pixels, 1 x exact" assay golden render --engine closed.json
 expect "and approved" 0 "1 approved" assay golden approve --new furnace/closed
 expect "all of these are as expected" 0 "all as it should be, 3 the same within their margins, 1 deliberate mistake" assay validate -q

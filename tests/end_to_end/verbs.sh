@@ -41,7 +41,7 @@ right() { # NAME COMMAND...
         failures=$((failures + 1))
     fi
 }
-expect "reference: help" 0 "usage: assay reference" "$assay" reference --help
+expect "reference: help" 0 "assay reference \[options\] *the same" "$assay" reference --help
 expect "reference: unknown engine" 3 "none of" "${reference[@]}" --engine mitsuba
 expect "reference: unknown scene" 3 "no scene 'x'" "${reference[@]}" --only x
 expect "reference: an argument" 3 "takes no argument 'x'" "${reference[@]}" x

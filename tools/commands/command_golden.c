@@ -240,7 +240,7 @@ static int compare_all(const struct settings *s, const struct suite *suite, stru
         selected +=
             is_selected(s, scene, ref->engine) && golden_is_there(s->opt.from_dir, scene, ref);
     if (selected == 0) {
-        err_set(e, "no candidates in %s: `assay golden render` makes them", s->opt.from_dir);
+        err_set(e, "no candidates in %s: golden render makes them", s->opt.from_dir);
         return EXIT_NOT_JUDGED;
     }
     opt.alpha = s->opt.alpha / selected;

@@ -183,6 +183,7 @@ static enum approval approve_compared(const struct pair *p, struct err *e)
 {
     struct comparison r;
     if (!compare(p, &r, e)) {
+        pair_noise_advise(e, "render the candidate with another --seed");
         err_prefix(e, "%s/%s: candidate (A) against stored (B)", p->scene->name, p->ref->engine);
         return APPROVE_IMPOSSIBLE;
     }
@@ -231,8 +232,8 @@ enum approval approve(const struct approve_options *opt, const struct suite_scen
     const struct golden *candidate = &p.candidate, *stored = &p.stored;
     fprintf(out, "%s/%s\n", scene->name, ref->engine);
     if (candidate->state == GOLDEN_MISSING) {
-        err_set(e, "%s/%s: no candidate in %s: `assay golden render` makes it", scene->name,
-                ref->engine, opt->from_dir);
+        err_set(e, "%s/%s: no candidate in %s: golden render makes it", scene->name, ref->engine,
+                opt->from_dir);
     } else if (candidate->state != GOLDEN_CURRENT) {
         *e = candidate->why;
         err_prefix(e, "%s candidate", golden_state_name(candidate->state));

@@ -48,7 +48,8 @@ static const struct cli_option options[] = {
     {0, "slurm", "", "run jobs of several replicates each on a Slurm cluster", TO(slurm)},
     {'h', "help", "", "print this", TO(help),
      .usage =
-         "usage: assay reference [options]\n\n"
+         "usage: assay golden render [options]\n"
+         "       assay reference [options]         the same\n\n"
          "Renders references with Cycles, POV-Ray or your own renderer, as candidates for golden approve.\n"},
     {0}};
 

@@ -216,19 +216,17 @@ static void write_statistics(FILE *f, const json_t *claim)
     fputs("</p>\n", f);
 }
 
-/* How to replace the reference, if it is a stored one (which has seeds). */
+/* How to replace the reference, if it is a stored one. */
 static void write_approval(FILE *f, const json_t *claim)
 {
-    if (json_object_get(claim, "seeds_b") == NULL)
-        return;
-    const char *scene = member_text(claim, "scene"), *b = member_text(claim, "b");
-    html_print(
-        f,
-        "<p class=\"caption\">If it is the stored reference that has to change: render it anew, look "
-        "at it, then approve it, which asks for a reason where it differs:</p>\n<pre "
-        "tabindex=\"0\"><code>assay golden render --fresh --engine %s --only %s\nassay golden approve "
-        "%s/%s</code></pre>\n",
-        b, scene, scene, b);
+    const char *commands = member_text(claim, "renew");
+    if (commands != NULL)
+        html_print(
+            f,
+            "<p class=\"caption\">If it is the stored reference that has to change: render it anew, look "
+            "at it, then approve it, which asks for a reason where it differs:</p>\n<pre "
+            "tabindex=\"0\"><code>%s</code></pre>\n",
+            commands);
 }
 
 void report_evidence(FILE *f, const json_t *claim, bool open)

@@ -237,6 +237,21 @@ static bool has_filter_of(const struct side *s, const json_t *manifest, struct e
                                                s->scene->name, s->name, has, wanted);
 }
 
+/* Reads the reference. If a suite of one's own lacks it, or has an old one, the line says how to make it. */
+static bool read_golden(const struct validation *v, struct side *s, struct side_image *out,
+                        struct err *e)
+{
+    const char *dir = v->opt->golden_dir;
+    if (golden_read(dir, s->scene, s->ref, &out->m, &out->manifest, e))
+        return has_filter_of(s, out->manifest, e);
+    struct golden g;
+    golden_inspect(dir, s->scene, s->ref, &g);
+    const struct renew r = renew_of(v, s);
+    const bool can = g.state == GOLDEN_MISSING || g.state == GOLDEN_STALE;
+    golden_free(&g);
+    return v->suite.is_own && can ? renew_say(&r, e) : false;
+}
+
 static bool make(struct validation *v, struct side *s, int stage, int look, struct side_image *out)
 {
     int l = below(s, stage, look);
@@ -249,10 +264,7 @@ static bool make(struct validation *v, struct side *s, int stage, int look, stru
     switch (s->kind) {
     case SIDE_OURS: ok = render_ours(v, s, stage, look, first, out, &s->e); break;
     case SIDE_TRUTH: ok = truth_render(s->scene, s->ref, &out->m, &s->e); break;
-    case SIDE_GOLDEN:
-        ok = golden_read(v->opt->golden_dir, s->scene, s->ref, &out->m, &out->manifest, &s->e) &&
-             has_filter_of(s, out->manifest, &s->e);
-        break;
+    case SIDE_GOLDEN: ok = read_golden(v, s, out, &s->e); break;
     case SIDE_LIVE: ok = render_live(v, s, stage, look, first, out, &s->e); break;
     case SIDE_ENGINE: ok = render_engine(v, s, stage, out, &s->e); break;
     }
@@ -263,6 +275,16 @@ static bool make(struct validation *v, struct side *s, int stage, int look, stru
     if (s->kind != SIDE_GOLDEN)
         s->cpu_s += out->seconds;
     return before == NULL || add_before(before, out, &s->e);
+}
+
+struct renew renew_of(const struct validation *v, const struct side *s)
+{
+    return (struct renew){.suite_dir = v->opt->suite_dir,
+                          .golden_dir = v->opt->golden_dir,
+                          .is_own = v->suite.is_own,
+                          .engine = v->opt->engine,
+                          .scene = s->scene->references_of,
+                          .name = s->name};
 }
 
 enum fetch_result side_at(struct validation *v, struct side *s, int stage, int look,

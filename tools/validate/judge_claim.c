@@ -34,7 +34,7 @@ static void add_place(json_t *words, const char *option, const char *place, stru
 static char *rerun_command(const struct validation *v, const struct claim_run *t)
 {
     const struct validate_options *o = v->opt;
-    const struct data_dirs at = data_dirs_of_suite(NULL);
+    const struct data_dirs at = data_dirs_find();
     char name[CLAIM_NAME];
     claim_run_name(t, name);
     /* The stages of the whole run: the claim's share of alpha alone might ask for two. */
@@ -55,8 +55,7 @@ static char *rerun_command(const struct validation *v, const struct claim_run *t
         add_option(w, "--budget", json_sprintf("%gs", o->budget_s));
     else if (v->sequence != &alpha_spending_single)
         add_option(w, "--until-different", NULL);
-    add_place(w, "--suite", o->suite_dir, at.suite);
-    add_place(w, "--golden", o->golden_dir, at.golden);
+    renew_add_places(w, v->suite.is_own, o->suite_dir, o->golden_dir);
     add_place(w, "--share", o->share_dir, at.share);
     add_place(w, "--pathtracer", o->pathtracer, at.pathtracer);
     char *command = json_command_line("assay", w);
@@ -123,6 +122,13 @@ static void add_provenance(json_t *claim, const struct validation *v, const stru
         json_object_set(claim, "version_b", version);
     if (seeds != NULL)
         json_object_set(claim, "seeds_b", seeds);
+    if (t->b->kind != SIDE_GOLDEN)
+        return;
+    const struct renew r = renew_of(v, t->b);
+    char *commands = renew_commands(&r);
+    if (commands != NULL)
+        json_object_set_new(claim, "renew", json_string(commands));
+    free(commands);
 }
 
 static json_t *files_of(const struct validation *v, const struct claim_run *t, struct err *e)
@@ -312,6 +318,8 @@ static void look(struct validation *v, struct claim_run *t)
         return;
     }
     if (!ok) {
+        pair_noise_advise(&e, v->opt->engine != NULL ? "give another --reference-seed"
+                                                     : "give another --seed");
         finish_unseen(v, t, e.msg, false);
         return;
     }
