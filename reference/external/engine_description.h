@@ -32,6 +32,9 @@ struct engine {
     json_t *json; /* owned; its arrays of strings have been checked */
 };
 
+/* The manifest's "version" where the description has no command for it. */
+#define ENGINE_VERSION_UNKNOWN "unknown"
+
 struct engine_options {
     int spp, replicates; /* 0: the description's */
     uint32_t seed;       /* replicate k's own seed is a hash of (seed, k) */

@@ -55,7 +55,7 @@ static bool read_version(const struct engine_job *j, char line[256], struct err 
     char program[4096];
     const struct engine_value values[] = {{"here", j->en->here}, {0}};
     char **argv = NULL;
-    strcpy(line, "unknown");
+    strcpy(line, ENGINE_VERSION_UNKNOWN);
     if (json_object_get(j->en->json, "version") == NULL)
         return true;
     const struct path log = fs_path("%s/version.log", j->dir);

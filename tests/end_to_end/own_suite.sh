@@ -137,6 +137,13 @@ sed -i 's/"exr"/"pfm"/; s/64/16/' blurred/mine.json
 tell "replicates whose pixels share noise make no reference" "$(env -C blurred assay golden render --engine mine.json 2>&1 | grep -q 'cornell, mine: pixels share their noise' ||
     echo "no such line")"
 
+# A version: the page of many runs names it.
+cp -r begun versioned
+sed -i 's/"format"/"version": ["echo", "mine 1.4-7"], "format"/' versioned/mine.json
+expect "an engine that states its version" 0 "all as it should be" env -C versioned assay validate -q
+expect "is named by it in a history" 0 "" assay report --history versioned/build
+tell "and not by ours" "$(grep -q '<td>mine 1.4-7</td>' versioned/build/history.html && ! grep -q nan versioned/build/history.html || grep '<td>' versioned/build/history.html)"
+
 # A margin of the engine's own, with its reason: a difference of 2.5 %, beyond the suite's margin of 1 %, is within it, and the page says so.
 cp -r begun wide
 sed -i 's/"spp": 32/"margin": {"global": 0.3, "tile": 0.9, "reason": "its paths are <short>"}, "spp": 32/' wide/mine.json

@@ -71,18 +71,19 @@ static void write_plot(FILE *f, const struct history *h, const struct history_se
     for (size_t i = 0; i < s->num; i++) {
         const struct history_point *p = &s->point[i];
         double v = value_of(p, q), run = (double)p->run;
-        char commit[128];
+        char version[128];
         if (!isfinite(v))
             continue;
         plot_line_to(&plot, run, v);
         if (q == DIFFERENCE)
             plot_segment(&plot, "line", run, 100 * p->low, run, 100 * p->high);
-        history_commit(&h->run[p->run], commit, sizeof commit);
-        plot_point(&plot, 0, run, v, "%s, %s: %s", commit,
+        history_version(&h->run[p->run], version, sizeof version);
+        plot_point(&plot, 0, run, v, "%s, %s: %s", version,
                    html_date(member_text(h->run[p->run].results, "date")).s, html_number(v).s);
     }
     plot_close(&plot);
-    fprintf(f, "last %s</td>", html_number(value_of(&s->point[s->num - 1], q)).s);
+    const double last = value_of(&s->point[s->num - 1], q);
+    fprintf(f, "last %s</td>", isfinite(last) ? html_number(last).s : "not known");
 }
 
 static void write_series(FILE *f, const struct history *h, const struct history_series *s)
@@ -112,17 +113,17 @@ static void write_csv(FILE *f, const struct history *h)
     if (from > 0)
         fprintf(f, "The last %zu runs: ", runs);
     struct csv csv = csv_link_open(f, "history.csv",
-                                   "scene,tested,against,commit,date,difference,low,high,"
+                                   "scene,tested,against,version,date,difference,low,high,"
                                    "variance_ratio,seconds,efficiency");
     for (size_t i = 0; i < h->num_series; i++) {
         const struct history_series *s = &h->series[i];
         for (size_t k = 0; k < s->num; k++) {
             const struct history_point *p = &s->point[k];
-            char commit[128];
+            char version[128];
             if (p->run < from)
                 continue;
-            history_commit(&h->run[p->run], commit, sizeof commit);
-            csv_link_row(&csv, "tttttnnnnnn", s->scene, s->a, s->b, commit,
+            history_version(&h->run[p->run], version, sizeof version);
+            csv_link_row(&csv, "tttttnnnnnn", s->scene, s->a, s->b, version,
                          member_text(h->run[p->run].results, "date"), p->difference, p->low,
                          p->high, p->variance_ratio, p->seconds, p->efficiency);
         }
@@ -163,17 +164,17 @@ static void write_runs(FILE *f, const struct history *h)
 {
     fputs("<section><h2>The runs</h2>\n", f);
     html_table_open(f, "runs", "Table of runs",
-                    "Date|Commit|Machine|>Claims|>As expected|>Time|File");
+                    "Date|Version|Machine|>Claims|>As expected|>Time|File");
     for (size_t r = h->num_runs; r-- > 0;) {
         const json_t *root = h->run[r].results, *claims = json_object_get(root, "claims");
         const size_t num = json_array_size(claims), good = num - num_wrong(&h->run[r]);
-        char commit[128];
-        history_commit(&h->run[r], commit, sizeof commit);
+        char version[128];
+        history_version(&h->run[r], version, sizeof version);
         html_row_open(f, good < num, html_date(member_text(root, "date")).s);
         html_print(f,
                    "<td>%s</td><td>%s</td><td class=\"num\">%zu</td><td class=\"num\">%zu</td>"
                    "<td class=\"num\">%s</td><td>%s</td></tr>\n",
-                   commit, member_text(root, "machine"), num, good,
+                   version, member_text(root, "machine"), num, good,
                    json_object_get(root, "seconds") != NULL
                        ? html_duration(member_number(root, "seconds")).s
                        : "",

@@ -159,7 +159,7 @@ static const struct shape files_shape = {.names = {[IS_TEXT] = "a b z relative"}
 
 static const struct shape judged_shape = {
     .names =
-        {[IS_TEXT] = "quantity verdict reason class? unit_b? version_b? renew?",
+        {[IS_TEXT] = "quantity verdict reason class? unit_b? version_a? version_b? renew?",
          [IS_NUMBER] =
              "alpha margin_global margin_tile difference log10_p mdb_global mdb_tile rms_bias extra_factor noise_share_a? n_a? n_b? spp_b? seconds_a? seconds_b?",
          [IS_COUNT] = "tile num_tests tiles_x tiles_y seed_a?",

@@ -224,8 +224,14 @@ void history_free(struct history *h)
     *h = (struct history){0};
 }
 
-void history_commit(const struct history_run *run, char *out, size_t size)
+void history_version(const struct history_run *run, char *out, size_t size)
 {
+    json_each(claim, json_object_get(run->results, "claims")) {
+        if (member_text(claim, "version_a") != NULL) {
+            snprintf(out, size, "%s", member_text(claim, "version_a"));
+            return;
+        }
+    }
     const char *version = member_text(run->results, "version"), *at = strstr(version, "commit ");
     snprintf(out, size, "%s", at != NULL ? at + strlen("commit ") : version);
     if (at != NULL)

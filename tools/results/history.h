@@ -52,8 +52,9 @@ struct history {
 NODISCARD bool history_read(const char *dir, double alpha, struct history *out, struct err *e);
 void history_free(struct history *h);
 
-/* The commit of a run: "d36ec014cebb" of "0.1 (commit d36ec014cebb)"; else its whole version. */
-void history_commit(const struct history_run *run, char *out, size_t size);
+/* What was tested in a run: the version of the engine, where one is stated, else ours: "d36ec014cebb" of
+ * "0.1 (commit d36ec014cebb)", or all of it. */
+void history_version(const struct history_run *run, char *out, size_t size);
 
 /* Writes the page (report/report_history.c): a row of plots against the runs for each series. Appears by rename. */
 NODISCARD bool report_history(const struct history *h, const char *path, struct err *e);

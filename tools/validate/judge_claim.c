@@ -116,6 +116,9 @@ static void add_provenance(json_t *claim, const struct validation *v, const stru
         json_object_set_new(claim, "seed_a", json_integer((json_int_t)v->opt->seed));
     if (!pair_noise_is_unknown(&a->m, &b->m))
         json_object_set_new(claim, "noise_share_a", json_real(pair_noise_share(&a->m, &b->m)));
+    const char *version_a = member_or_empty(a->manifest, "version");
+    if (version_a[0] != '\0' && strcmp(version_a, ENGINE_VERSION_UNKNOWN) != 0)
+        json_object_set_new(claim, "version_a", json_string(version_a));
     json_t *version = json_object_get(b->manifest, "version");
     json_t *seeds = json_object_get(b->manifest, "seeds");
     if (version != NULL)

@@ -571,7 +571,7 @@ TEST(names_cannot_inject_markup)
     json_t *claim = json_array_get(r.claims, 0);
     static const char *const member[] = {"title", "detects",  "blind_to",  "reason",
                                          "a",     "rerun",    "version_b", "unit_b",
-                                         "class", "quantity", "renew"};
+                                         "class", "quantity", "renew",     "version_a"};
     for (size_t i = 0; i < COUNT(member); i++)
         json_object_set_new(claim, member[i], json_string(i % 2 ? evil : quote));
     json_object_set_new(claim, "notes", json_pack("[s]", evil));

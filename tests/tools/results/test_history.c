@@ -71,7 +71,7 @@ TEST(a_move_is_found)
     /* 64 paths in 2 s, each worth 1/1.6 of one of B. */
     assert_float_equal(h.series[0].point[1].efficiency, 64 / (2 * 1.6), 1e-9);
     char commit[32];
-    history_commit(&h.run[0], commit, sizeof commit);
+    history_version(&h.run[0], commit, sizeof commit);
     assert_string_equal(commit, "abc123");
 
     struct err e;
@@ -82,6 +82,27 @@ TEST(a_move_is_found)
     assert_null(strstr(text, "<b>2 x CPU"));
     assert_null(strstr(text, "<script"));
     assert_non_null(strstr(text, "20_&lt;i&gt;moves"));
+}
+
+/* The runs of an engine that states its version, which the last could not compare the variances of. */
+TEST(the_version_is_that_of_what_is_tested)
+{
+    json_t *first = claim_of("10_it", 0.001), *last = claim_of("10_it", 0.001);
+    json_object_set_new(first, "version_a", json_string("1.4-2-gabc"));
+    json_object_set_new(last, "version_a", json_string("1.5"));
+    json_object_del(last, "variance_ratio");
+    write_run("versions", "1/results.json", "2026-01-01T00:00:00Z", json_pack("[o]", first));
+    write_run("versions", "2/results.json", "2026-01-02T00:00:00Z", json_pack("[o]", last));
+    OWN(history) h;
+    read_or_fail("versions", &h);
+    struct err e;
+    MUST(report_history(&h, test_path("versions.html"), &e));
+    OWN_TEXT text = test_read(test_path("versions.html"));
+    assert_non_null(strstr(text, "<td>1.4-2-gabc</td>"));
+    assert_non_null(strstr(text, "<td>1.5</td>"));
+    assert_non_null(strstr(text, "last not known"));
+    assert_null(strstr(text, "nan"));
+    assert_null(strstr(text, "abc123"));
 }
 
 /* A series that the last run lacks, or that has only one run, has not moved. */
