@@ -60,6 +60,17 @@ bool process_find(const char *argv0, char *path, size_t size)
     return false;
 }
 
+bool process_find_or_say(const char *argv0, char *path, size_t size, struct err *e)
+{
+    struct stat st;
+    const bool is_path = strchr(argv0, '/') != NULL;
+    if (process_find(argv0, path, size))
+        return true;
+    if (is_path && stat(argv0, &st) == 0 && S_ISREG(st.st_mode))
+        return err_set(e, "%s: is not executable (chmod +x)", argv0);
+    return err_set(e, "%s: no such program%s", argv0, is_path ? "" : " in PATH");
+}
+
 /* The guard is a process that leads the process group. If its parent dies for any reason, even by
  * SIGKILL, the kernel sends the guard SIGUSR1, and the guard kills the group. It also keeps the
  * group's id from being reused until we have killed the group. Only async-signal-safe calls, since
@@ -341,9 +352,8 @@ bool process_run(const struct process *p, struct process_usage *usage, struct er
 {
     assert(p->argv != NULL && p->argv[0] != NULL && p->timeout_s >= 0);
     char path[4096];
-    if (!process_find(p->argv[0], path, sizeof path))
-        return err_set(e, "%s: no such program%s", p->argv[0],
-                       strchr(p->argv[0], '/') != NULL ? "" : " in PATH");
+    if (!process_find_or_say(p->argv[0], path, sizeof path, e))
+        return false;
     struct run r = {.out = -1,
                     .log = -1,
                     .clean = p->log_most > 0,

@@ -38,5 +38,7 @@ NODISCARD bool process_run(const struct process *p, struct process_usage *usage,
 
 /* True if argv0 can be found in PATH; fills its absolute path. An argv0 with a slash is a path. */
 bool process_find(const char *argv0, char *path, size_t size);
+/* The same; the line says if a file of that path is there but not executable. */
+NODISCARD bool process_find_or_say(const char *argv0, char *path, size_t size, struct err *e);
 
 #endif

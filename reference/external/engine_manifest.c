@@ -22,8 +22,7 @@ static bool find_program(const struct engine *en, const char *argv0, char *path,
     char name[PATH_SIZE];
     bool relative = argv0[0] != '/' && strchr(argv0, '/') != NULL;
     snprintf(name, sizeof name, "%s%s%s", relative ? en->here : "", relative ? "/" : "", argv0);
-    return process_find(name, path, size) ||
-           err_set(e, "%s: no such program%s", name, strchr(name, '/') != NULL ? "" : " in PATH");
+    return process_find_or_say(name, path, size, e);
 }
 
 bool engine_program(const struct engine *en, const char *key, char *path, size_t size,

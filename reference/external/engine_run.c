@@ -9,6 +9,7 @@
 
 #include "renderer/base/fs.h"
 #include "renderer/base/progress.h"
+#include "renderer/image/image_oiio.h"
 
 #include <assert.h>
 #include <errno.h>
@@ -75,6 +76,21 @@ static bool run_process(struct engine_job *j, uint32_t seed, const char *out, st
     return ok;
 }
 
+/* Is there an image of floats, as radiance has to be? Bytes and 16-bit integers are clamped and mostly have a tone
+ * curve. */
+static bool check_image(const struct engine_job *j, const char *path, struct err *e)
+{
+    struct image_info info;
+    if (access(path, F_OK) != 0)
+        return err_set(e, "%s: ended without an error, but wrote no image, %s is not there",
+                       j->program, path);
+    if (!image_inspect(path, &info, e))
+        return false;
+    return info.type == IMAGE_HALF || info.type == IMAGE_FLOAT ||
+           err_set(e, "%s: an image of %d-bit integers, not of floats: write linear radiance as %s",
+                   path, 8 * info.bytes, j->en->image);
+}
+
 /* Image k (the caller frees it): one run, or one per channel, each with its own seed and used for that channel only. */
 static float *render_image(struct engine_job *j, int k, struct err *e)
 {
@@ -84,10 +100,12 @@ static float *render_image(struct engine_job *j, int k, struct err *e)
     float *out = NULL;
     for (j->channel = 0; j->channel < runs; j->channel++) {
         const size_t c = (size_t)j->channel;
-        float *px = run_process(j, replicate_seed(j->opt->seed, runs * k + j->channel), path.s, e)
-                        ? replicate_images_read_any(path.s, j->suite->width, j->suite->height,
-                                                    j->en->scale, &j->half, e)
-                        : NULL;
+        float *px =
+            run_process(j, replicate_seed(j->opt->seed, runs * k + j->channel), path.s, e) &&
+                    check_image(j, path.s, e)
+                ? replicate_images_read_any(path.s, j->suite->width, j->suite->height, j->en->scale,
+                                            &j->half, e)
+                : NULL;
         if (px == NULL) {
             free(out);
             return NULL;

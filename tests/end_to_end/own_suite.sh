@@ -45,6 +45,7 @@ expect "init in a folder whose name a shell would split" 0 "\`assay validate --s
 tell "so does the workflow there quote it" "$(grep -q "validate --suite 'it'.''s mine' --out" "it's mine/renders.yml" || echo "it does not")"
 expect "init does not write over what is there" 3 "begun/suite.json is there already" assay init begun
 expect "it is green from another folder" 0 "result: all as it should be, 1 the same" assay validate --suite begun --out report
+tell "a place that does not stand out is not named" "$(grep -o '0 x 0 pixels' report/results.json | head -n 1; grep -q '"what": "nothing stands out"' report/results.json || echo "nothing is said")"
 tell "validate says where it looked" "$(grep -qx "suite $tmp/free/begun (1 scene), goldens $tmp/free/begun/golden, engine $tmp/free/begun/mine.json" "$tmp/err" || cat "$tmp/err")"
 expect "goldens are current" 0 "current  cornell/mine-1.0" env -C begun assay golden status
 again=$(python3 -c "import json; print(json.load(open('report/results.json'))['claims'][0]['rerun'])")

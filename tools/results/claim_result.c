@@ -36,9 +36,10 @@ static json_t *statistics_json(const struct comparison *r)
     json_t *all = json_array();
     for (int s = 0; s < NUM_STATISTICS; s++) {
         const struct statistic *st = &r->statistic[s];
+        const char *what = st->log10_p < 0 ? st->what : "nothing stands out";
         json_array_append_new(all, json_pack("{s:s, s:f, s:i, s:f, s:s}", "name", statistic_name[s],
                                              "share", st->share, "num_tests", st->num_tests,
-                                             "log10_p", st->log10_p, "what", st->what));
+                                             "log10_p", st->log10_p, "what", what));
     }
     return all;
 }

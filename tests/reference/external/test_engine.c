@@ -546,17 +546,19 @@ TEST(programs_that_misbehave_are_errors)
     write_pfm("nan.pfm", W, H, not_a_number, 0);
     test_write(test_path("grey.pfm"),
                "Pf\n4 3\n-1.0\n................................................", 60);
+    test_write(test_path("bytes.pfm"), "P6\n4 3\n255\n....................................", 47);
     static const struct {
         const char *script, *error;
     } cases[] = {
         {"echo I am ill >&2; exit 3", "exit status 3: I am ill"},
         {"kill -9 $$", "killed by signal 9"},
         {"sleep 30", "no end after 1 s"},
-        {"true", "replicate_0000.pfm: cannot read"},
+        {"true", "sh: ended without an error, but wrote no image"},
         {"echo garbage > $2", "replicate_0000.pfm"},
         {"cp {here}/large.pfm $2", "5 x 3 pixels, not 4 x 3"},
         {"cp {here}/nan.pfm $2", "pixel 2,1 is not finite"},
         {"cp {here}/grey.pfm $2", "no channels R, G and B"},
+        {"cp {here}/bytes.pfm $2", "replicate_0000.pfm: an image of 8-bit integers, not of floats"},
         {"cp {here}/ramp.pfm $2", "replicate 1 is the same image as an earlier one: the seed has"},
     };
     for (size_t i = 0; i < COUNT(cases); i++) {
@@ -579,6 +581,9 @@ TEST(programs_that_misbehave_are_errors)
     assert_false(render(&en, &point_plane, &m, &manifest, &e));
     /* Beside the description, not where we stand. */
     assert_non_null(strstr(e.msg, test_path("./no-such-program: no such program")));
+    test_write(test_path("no-such-program"), "#!/bin/sh\n", 10);
+    assert_false(render(&en, &point_plane, &m, &manifest, &e));
+    assert_non_null(strstr(e.msg, test_path("./no-such-program: is not executable")));
 }
 
 /* No name or ending says two engines, each can be asked to export, and those with goldens, which come first, are driven. */
