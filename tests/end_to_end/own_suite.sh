@@ -138,6 +138,16 @@ sed -i 's/"exr"/"pfm"/; s/64/16/' blurred/mine.json
 tell "replicates whose pixels share noise make no reference" "$(env -C blurred assay golden render --engine mine.json 2>&1 | grep -q 'cornell, mine: pixels share their noise' ||
     echo "no such line")"
 
+# A pixel filter: a reference that was rendered under it is compared under it.
+cp -r begun tent && rm -r tent/golden
+sed -i 's/"format"/"filter": "tent:1", "format"/' tent/mine.json
+sed -i 's/0.01/0.1/' tent/suite.json
+env -C tent assay golden render --engine mine.json >/dev/null 2>&1
+expect "a reference under the engine's own filter" 0 "1 approved" env -C tent assay golden approve --new
+expect "is what it is compared with" 0 "all as it should be, 1 the same" env -C tent assay validate -q
+sed -i 's/tent:1/tent:2/' tent/mine.json
+expect "but not under another" 3 "stored with the pixel filter tent:1, not tent:2" env -C tent assay validate -q
+
 # A version: the page of many runs names it.
 cp -r begun versioned
 sed -i 's/"format"/"version": ["echo", "mine 1.4-7"], "format"/' versioned/mine.json

@@ -16,11 +16,16 @@ static void add_words(json_t *words, const char *const *word)
         json_array_append_new(words, json_string(*word));
 }
 
-/* Is it the engine's name, or that and -VERSION? So does `golden render` choose the reference that an engine makes. */
-static bool is_made_by(const struct engine *en, const char *name)
+/* Did the engine make what is stored? Else: is the reference called as it, or as it and -VERSION? So does `golden render`
+ * choose the reference that an engine makes. */
+static bool is_made_by(const struct engine *en, const struct renew *r)
 {
     const size_t n = en != NULL ? strlen(en->name) : 0;
-    return n > 0 && strncmp(name, en->name, n) == 0 && (name[n] == '\0' || name[n] == '-');
+    const char *maker = member_text(
+        json_object_get(json_object_get(r->manifest, "settings"), "description"), "name");
+    if (n > 0 && maker != NULL)
+        return strcmp(maker, en->name) == 0;
+    return n > 0 && strncmp(r->name, en->name, n) == 0 && (r->name[n] == '\0' || r->name[n] == '-');
 }
 
 void renew_add_places(json_t *words, bool is_own, const char *suite_dir, const char *golden_dir)
@@ -55,7 +60,7 @@ static char *command(const struct renew *r, const char *verb)
 
 char *renew_commands(const struct renew *r)
 {
-    if (engine_with_goldens(r->name) == NULL && !is_made_by(r->engine, r->name))
+    if (engine_with_goldens(r->name) == NULL && !is_made_by(r->engine, r))
         return NULL;
     char *render = command(r, "render"), *approve = command(r, "approve"), *both = NULL;
     if (render != NULL && approve != NULL && asprintf(&both, "%s\n%s", render, approve) < 0)

@@ -3,6 +3,7 @@
 #include "validate_internal.h"
 
 #include "reference/base/json_file.h"
+#include "reference/base/json_node.h"
 #include "reference/store/reference_render.h"
 #include "reference/truth/truth.h"
 #include "renderer/base/fs.h"
@@ -221,12 +222,12 @@ static bool add_before(const struct side_image *before, struct side_image *more,
     return true;
 }
 
-/* Was the reference stored with the scene's pixel filter? The manifest's "description" names it; else it is the box
- * of one pixel. */
+/* Was the reference stored with the scene's pixel filter? The engine's description in the manifest names it; else it is
+ * the box of one pixel. */
 static bool has_filter_of(const struct side *s, const json_t *manifest, struct err *e)
 {
-    const char *stored =
-        json_string_value(json_object_get(json_object_get(manifest, "description"), "filter"));
+    const json_t *settings = json_object_get(manifest, "settings");
+    const char *stored = member_text(json_object_get(settings, "description"), "filter");
     struct pixel_filter filter;
     char has[PIXEL_FILTER_TEXT], wanted[PIXEL_FILTER_TEXT];
     if (!pixel_filter_parse(stored != NULL ? stored : "box", &filter, e))
@@ -246,10 +247,11 @@ static bool read_golden(const struct validation *v, struct side *s, struct side_
         return has_filter_of(s, out->manifest, e);
     struct golden g;
     golden_inspect(dir, s->scene, s->ref, &g);
-    const struct renew r = renew_of(v, s);
-    const bool can = g.state == GOLDEN_MISSING || g.state == GOLDEN_STALE;
+    const struct renew r = renew_of(v, s, g.manifest);
+    if (v->suite.is_own && (g.state == GOLDEN_MISSING || g.state == GOLDEN_STALE))
+        renew_say(&r, e);
     golden_free(&g);
-    return v->suite.is_own && can ? renew_say(&r, e) : false;
+    return false;
 }
 
 static bool make(struct validation *v, struct side *s, int stage, int look, struct side_image *out)
@@ -277,14 +279,15 @@ static bool make(struct validation *v, struct side *s, int stage, int look, stru
     return before == NULL || add_before(before, out, &s->e);
 }
 
-struct renew renew_of(const struct validation *v, const struct side *s)
+struct renew renew_of(const struct validation *v, const struct side *s, const json_t *manifest)
 {
     return (struct renew){.suite_dir = v->opt->suite_dir,
                           .golden_dir = v->opt->golden_dir,
                           .is_own = v->suite.is_own,
                           .engine = v->opt->engine,
                           .scene = s->scene->references_of,
-                          .name = s->name};
+                          .name = s->name,
+                          .manifest = manifest};
 }
 
 enum fetch_result side_at(struct validation *v, struct side *s, int stage, int look,

@@ -127,7 +127,7 @@ static void add_provenance(json_t *claim, const struct validation *v, const stru
         json_object_set(claim, "seeds_b", seeds);
     if (t->b->kind != SIDE_GOLDEN)
         return;
-    const struct renew r = renew_of(v, t->b);
+    const struct renew r = renew_of(v, t->b, b->manifest);
     char *commands = renew_commands(&r);
     if (commands != NULL)
         json_object_set_new(claim, "renew", json_string(commands));

@@ -118,8 +118,8 @@ enum fetch_result side_at(struct validation *v, struct side *s, int stage, int l
 /* Writes that image for the report, unless it has been; *file: its path, relative to out_dir. */
 NODISCARD bool side_write(const struct validation *v, struct side *s, int stage, int look,
                           struct path *file, struct err *e);
-/* How a stored reference is made anew. */
-struct renew renew_of(const struct validation *v, const struct side *s);
+/* How a stored reference, which may have a manifest, is made anew. */
+struct renew renew_of(const struct validation *v, const struct side *s, const json_t *manifest);
 void side_free(struct side *s);
 
 /* Does --only select any claim of a scene? All of them? */
