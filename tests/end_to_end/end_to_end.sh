@@ -643,7 +643,7 @@ expect "golden status of damaged goldens" 3 "damaged  11_furnace/cycles" \
     $golden status --golden "$tmp/golden"
 expect "golden status of another scene" 3 "stale    11_furnace/cycles" \
     $golden status --suite "$tmp/scenes"
-expect "golden approve needs names" 3 "takes --all or names" $golden approve --from golden
+expect "golden approve needs names" 3 "takes --all, --new or names" $golden approve --from golden
 expect "golden approve: nothing is stored" 3 "approve it with --new" \
     $golden approve --from golden --golden "$tmp/store" 11_furnace
 expect "golden approve --new" 0 "6 approved" \

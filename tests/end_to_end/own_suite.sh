@@ -97,7 +97,10 @@ cd many || exit 1
 expect "golden render has its name in its help" 0 "usage: assay golden render" assay golden render --help
 expect "a reference that is missing is named, with what makes it" 3 "no golden of closed: render it with the file that describes what makes it (golden render --engine FILE --as closed)" assay validate -q --only furnace
 expect "a closed form is stored" 0 "furnace/closed.exr: 16 x 16 pixels, 1 x exact" assay golden render --engine closed.json
-expect "and approved" 0 "1 approved" assay golden approve --new furnace/closed
+sed -i 's/"comment": "/&and /' mine.json
+assay golden render --engine mine.json --as mine-1.0 --only cornell >/dev/null 2>&1
+expect "and approved, without what is no longer new" 0 "^1 approved, 0 unchanged" assay golden approve --new
+expect "--all is for that, too" 0 "approved, in place of what was stored" assay golden approve --all
 expect "all of these are as expected" 0 "all as it should be, 3 the same within their margins, 1 deliberate mistake" assay validate -q
 expect "an engine that is no reference" 3 "dae: is it one of .*mine-1.0.*give --as NAME" assay golden render --engine dae.json
 expect "what an engine cannot express is said" 0 "dae cannot express cornell: the description does not list: area" assay golden render --engine dae.json --as mine-1.0

@@ -38,7 +38,10 @@ static const struct cli_option options[] = {
      "directory of scenes (current directory if it has a suite.json, else\n"
      "reference/scenes)",
      TO(suite_dir)},
-    {0, "new", "", "also approve candidates for which no reference is stored", TO(opt.accept_new)},
+    {0, "new", "",
+     "also approve candidates for which no reference is stored; without\n"
+     "--all and names, only those: what is stored stays",
+     TO(opt.accept_new)},
     {0, "accept-difference", "WHY",
      "also approve candidates that are DIFFERENT, or INCONCLUSIVE with at least\n"
      "1.25 times the samples of what is stored; the manifest records WHY",
@@ -50,7 +53,9 @@ static const struct cli_option options[] = {
          "usage: assay golden render [options]          renders candidates (see assay golden render --help)\n"
          "       assay golden status [options]          lists stored references and their problems\n"
          "       assay golden compare [options] [SCENE | SCENE/ENGINE] ...  candidates with stored references\n"
-         "       assay golden approve [options] [--all] [SCENE | SCENE/ENGINE | SCENE/noise] ...\n"},
+         "       assay golden approve [options] --new           stores what is new\n"
+         "       assay golden approve [options] [--all] [SCENE | SCENE/ENGINE | SCENE/noise] ...\n"
+         "                            compares candidates with what is stored, and stores them in its place\n"},
     {.noun = "names", CLI_TO_LIST(struct settings, names, num_names)}};
 
 /* Reference i of those of the suite that an engine renders, over all scenes, and its scene; NULL past the last. */
@@ -86,8 +91,8 @@ static bool is_selected(const struct settings *s, const struct suite_scene *scen
 /* Checks that every name is that of a reference or of a scene's noise. */
 static bool check_names(const struct settings *s, const struct suite *suite, struct err *e)
 {
-    if (!s->all && s->num_names == 0)
-        return err_set(e, "approve takes --all or names of references (see --help)");
+    if (!s->all && s->num_names == 0 && !s->opt.accept_new)
+        return err_set(e, "approve takes --all, --new or names of references (see --help)");
     for (int n = 0; n < s->num_names; n++) {
         const struct suite_scene *scene;
         const struct suite_reference *ref;
@@ -111,6 +116,22 @@ static bool is_current(const struct settings *s, const struct suite_scene *scene
     bool current = g.state == GOLDEN_CURRENT;
     golden_free(&g);
     return current;
+}
+
+/* --new by itself: nothing that is stored is replaced. */
+static bool only_new(const struct settings *s)
+{
+    return s->opt.accept_new && !s->all && s->num_names == 0;
+}
+
+/* Is the reference to be approved? Under --all one that is up to date needs no candidate. */
+static bool is_wanted(const struct settings *s, const struct suite_scene *scene,
+                      const struct suite_reference *ref)
+{
+    if (only_new(s) && golden_is_there(s->opt.golden_dir, scene, ref))
+        return false;
+    return is_selected(s, scene, ref->engine) &&
+           !(s->all && !golden_is_there(s->opt.from_dir, scene, ref) && is_current(s, scene, ref));
 }
 
 /* Prints the stored references that the suite does not have; *num: how many, *first: one of them. */
@@ -190,9 +211,7 @@ static int approve_all(const struct settings *s, const struct suite *suite, stru
             selected += noise_record_count(s->opt.from_dir, &suite->scene[i]);
     opt.alpha = s->opt.alpha / (selected > 0 ? selected : 1);
     for (int i = 0; (ref = rendered_reference(suite, i, &scene)) != NULL; i++) {
-        /* Under --all a reference that is up to date needs no candidate. */
-        if (!is_selected(s, scene, ref->engine) ||
-            (s->all && !golden_is_there(s->opt.from_dir, scene, ref) && is_current(s, scene, ref)))
+        if (!is_wanted(s, scene, ref))
             continue;
         struct err why = {0};
         enum approval done = approve(&opt, scene, ref, stdout, &why);
@@ -204,7 +223,7 @@ static int approve_all(const struct settings *s, const struct suite *suite, stru
             *e = why;
         count[done == APPROVE_BETTER ? APPROVE_INCONCLUSIVE : done]++;
     }
-    for (int i = 0; i < suite->num_scenes; i++)
+    for (int i = 0; i < suite->num_scenes && !only_new(s); i++)
         if (is_selected(s, &suite->scene[i], "noise"))
             noise_record_approve(&opt, &suite->scene[i], stdout, count, e);
     struct path first;

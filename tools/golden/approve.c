@@ -84,7 +84,7 @@ static enum approval accept(const struct pair *p, const char *verdict, json_t *c
         golden_write(p->opt->golden_dir, p->scene->name, p->ref->engine, &p->candidate.m, entry, e);
     json_decref(entry);
     if (ok)
-        fprintf(p->out, "  approved\n");
+        fprintf(p->out, "  approved%s\n", stored != NULL ? ", in place of what was stored" : "");
     return ok ? APPROVE_ACCEPTED : APPROVE_IMPOSSIBLE;
 }
 
