@@ -190,7 +190,8 @@ cd "$tmp/walk" || exit 1
 cp "$top/tests/end_to_end/tracer.py" .
 echo '{"floor": [0.5, 0.5, 0.5], "lamp": {"height": 3, "size": 1, "radiance": 20}, "balls": [{"at": [0, 0.5, 0], "radius": 0.5, "albedo": [0.7, 0.3, 0.2]}]}' >ball.json
 echo '{"floor": [0.6, 0.6, 0.6], "lamp": {"height": 3, "size": 2, "radiance": 5}, "balls": [{"at": [-0.6, 0.5, 0], "radius": 0.5, "albedo": [0.2, 0.6, 0.3]}, {"at": [0.5, 0.4, 0.4], "radius": 0.4, "albedo": [0.8, 0.8, 0.8]}]}' >two.json
-guide() { sed -n 's/^    //p' "$top/tools/docs/guide-own-suite.md" | grep -v '^result:'; }
+# 16 images in place of 64 are enough for that tracer, and take a quarter of the time.
+guide() { sed -n 's/^    //p' "$top/tools/docs/guide-own-suite.md" | grep -v '^result:' | sed '/"pfm"/s/$/; sed -i s,64,16, mine.json/'; }
 guide | sed '/^cd \.\.$/,$d' >first.sh
 guide | sed -n '/^cd \.\.$/,$p' | sed 1d >second.sh
 bash -c 'trap '\''s=$?; echo "status $s: $BASH_COMMAND"; [ $s -le 1 ] || exit'\'' ERR; . ./first.sh' >first.out 2>&1 </dev/null
