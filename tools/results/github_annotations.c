@@ -1,5 +1,6 @@
 #include "github_annotations.h"
 
+#include "plain_words.h"
 #include "results.h"
 
 /* Percent-encodes whatever would end the command or, in a property, the property. */
@@ -45,6 +46,9 @@ static void print_claim(FILE *f, const struct results_walk *w)
         fputs(": ", f);
         print_escaped(f, member_text(claim, "reason"), false);
         fprintf(f, " (difference %+.3g %%25)", 100 * member_number(claim, "difference"));
+        const struct plain_words more = plain_words_more_samples(claim);
+        fputs(more.s[0] != '\0' ? "; " : "", f);
+        print_escaped(f, more.s, false);
     }
     if (member_text(claim, "rerun") != NULL) {
         fputs("%0Aagain: ", f);
