@@ -3,7 +3,7 @@
 #include "reference/base/json_node.h"
 #include "reference/base/utc_date.h"
 #include "tools/compare/region.h"
-#include "tools/validate/pair_noise.h"
+#include "tools/sequential/pair_noise.h"
 
 #include <string.h>
 

@@ -5,13 +5,17 @@
 #include "reference/base/json_file.h"
 #include "reference/base/json_node.h"
 #include "reference/store/reference_render.h"
+#include "reference/suite/engine_table.h"
 #include "reference/truth/truth.h"
 #include "renderer/base/fs.h"
 #include "renderer/base/progress.h"
+#include "tools/base/data_dirs.h"
 
 #include <assert.h>
+#include <limits.h>
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 /* Error rates were measured for 16 samples or more; starting an engine costs more than a few replicates. */
@@ -238,6 +242,78 @@ static bool has_filter_of(const struct side *s, const json_t *manifest, struct e
                                                s->scene->name, s->name, has, wanted);
 }
 
+static void add_words(json_t *words, const char *const *word)
+{
+    for (; *word != NULL; word++)
+        json_array_append_new(words, json_string(*word));
+}
+
+void side_add_places(const struct validation *v, bool of_goldens, json_t *words)
+{
+    const struct validate_options *o = v->opt;
+    char full[PATH_MAX], found[PATH_MAX];
+    const bool own = v->suite.is_own;
+    const struct data_dirs at = own ? data_dirs_of_suite(o->suite_dir) : data_dirs_find();
+    if ((own || strcmp(o->suite_dir, at.suite.s) != 0) && realpath(o->suite_dir, full) != NULL)
+        add_words(words, (const char *[]){"--suite", full, NULL});
+    if (of_goldens && realpath(o->golden_dir, full) != NULL &&
+        (realpath(at.golden.s, found) == NULL || strcmp(full, found) != 0))
+        add_words(words, (const char *[]){"--golden", full, NULL});
+}
+
+/* Did the engine make what is stored? Else: is the reference called as it, or as it and -VERSION? So does `golden render`
+ * choose the reference that an engine makes. */
+static bool is_made_by(const struct engine *en, const char *name, const json_t *manifest)
+{
+    const size_t n = en != NULL ? strlen(en->name) : 0;
+    const json_t *settings = json_object_get(manifest, "settings");
+    const char *maker = member_text(json_object_get(settings, "description"), "name");
+    if (n > 0 && maker != NULL)
+        return strcmp(maker, en->name) == 0;
+    return n > 0 && strncmp(name, en->name, n) == 0 && (name[n] == '\0' || name[n] == '-');
+}
+
+json_t *side_renewal(const struct validation *v, const struct side *s, const json_t *manifest)
+{
+    const char *scene = s->scene->references_of;
+    const bool ours = engine_with_goldens(s->name) != NULL;
+    if (!ours && !is_made_by(v->opt->engine, s->name, manifest))
+        return NULL;
+    json_t *render = json_pack("[s,s]", "golden", "render"),
+           *approve = json_pack("[s,s]", "golden", "approve");
+    side_add_places(v, false, render);
+    add_words(render, (const char *[]){"--fresh", "--only", scene, "--engine",
+                                       ours ? s->name : v->opt->engine->file, ours ? NULL : "--as",
+                                       s->name, NULL});
+    side_add_places(v, true, approve);
+    add_words(approve, (const char *[]){"--new", fs_path("%s/%s", scene, s->name).s, NULL});
+    char *first = json_command_line("assay", render), *then = json_command_line("assay", approve);
+    json_t *both = first != NULL && then != NULL ? json_sprintf("%s\n%s", first, then) : NULL;
+    free(first);
+    free(then);
+    json_decref(render);
+    json_decref(approve);
+    return both;
+}
+
+/* Adds to a line that says that a reference of a suite of one's own is missing or stale how it is made. */
+static void say_renewal(const struct validation *v, const struct side *s, const json_t *manifest,
+                        struct err *e)
+{
+    const struct err why = *e;
+    json_t *commands = side_renewal(v, s, manifest);
+    const char *render = json_string_value(commands);
+    if (render != NULL)
+        err_set(e, "%.500s: %.*s && %s", why.msg, (int)strcspn(render, "\n"), render,
+                strchr(render, '\n') + 1);
+    else
+        err_set(e,
+                "%.500s: render it with the file that describes what makes it (golden render "
+                "--engine FILE --as %s), then approve it",
+                why.msg, s->name);
+    json_decref(commands);
+}
+
 /* Reads the reference. If a suite of one's own lacks it, or has an old one, the line says how to make it. */
 static bool read_golden(const struct validation *v, struct side *s, struct side_image *out,
                         struct err *e)
@@ -247,9 +323,8 @@ static bool read_golden(const struct validation *v, struct side *s, struct side_
         return has_filter_of(s, out->manifest, e);
     struct golden g;
     golden_inspect(dir, s->scene, s->ref, &g);
-    const struct renew r = renew_of(v, s, g.manifest);
     if (v->suite.is_own && (g.state == GOLDEN_MISSING || g.state == GOLDEN_STALE))
-        renew_say(&r, e);
+        say_renewal(v, s, g.manifest, e);
     golden_free(&g);
     return false;
 }
@@ -277,17 +352,6 @@ static bool make(struct validation *v, struct side *s, int stage, int look, stru
     if (s->kind != SIDE_GOLDEN)
         s->cpu_s += out->seconds;
     return before == NULL || add_before(before, out, &s->e);
-}
-
-struct renew renew_of(const struct validation *v, const struct side *s, const json_t *manifest)
-{
-    return (struct renew){.suite_dir = v->opt->suite_dir,
-                          .golden_dir = v->opt->golden_dir,
-                          .is_own = v->suite.is_own,
-                          .engine = v->opt->engine,
-                          .scene = s->scene->references_of,
-                          .name = s->name,
-                          .manifest = manifest};
 }
 
 enum fetch_result side_at(struct validation *v, struct side *s, int stage, int look,

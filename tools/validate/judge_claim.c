@@ -1,6 +1,5 @@
 /* Takes one look at a claim, decides it, and writes its row of results.json with the maps (z,
  * relative). */
-#include "pair_noise.h"
 #include "validate_internal.h"
 #include "renderer/base/fs.h"
 #include "tools/base/data_dirs.h"
@@ -10,6 +9,7 @@
 #include "tools/results/noise_results.h"
 #include "tools/results/stated_error_results.h"
 #include "tools/results/results.h"
+#include "tools/sequential/pair_noise.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -55,7 +55,7 @@ static char *rerun_command(const struct validation *v, const struct claim_run *t
         add_option(w, "--budget", json_sprintf("%gs", o->budget_s));
     else if (v->sequence != &alpha_spending_single)
         add_option(w, "--until-different", NULL);
-    renew_add_places(w, v->suite.is_own, o->suite_dir, o->golden_dir);
+    side_add_places(v, true, w);
     add_place(w, "--share", o->share_dir, at.share);
     add_place(w, "--pathtracer", o->pathtracer, at.pathtracer);
     char *command = json_command_line("assay", w);
@@ -127,11 +127,9 @@ static void add_provenance(json_t *claim, const struct validation *v, const stru
         json_object_set(claim, "seeds_b", seeds);
     if (t->b->kind != SIDE_GOLDEN)
         return;
-    const struct renew r = renew_of(v, t->b, b->manifest);
-    char *commands = renew_commands(&r);
+    json_t *commands = side_renewal(v, t->b, b->manifest);
     if (commands != NULL)
-        json_object_set_new(claim, "renew", json_string(commands));
-    free(commands);
+        json_object_set_new(claim, "renew", commands);
 }
 
 static json_t *files_of(const struct validation *v, const struct claim_run *t, struct err *e)

@@ -6,7 +6,6 @@
 #include "renderer/base/fs.h"
 #include "renderer/image/moments.h"
 #include "run_pathtracer.h"
-#include "tools/golden/renew.h"
 #include "tools/sequential/alpha_spending.h"
 #include "validate.h"
 
@@ -118,8 +117,13 @@ enum fetch_result side_at(struct validation *v, struct side *s, int stage, int l
 /* Writes that image for the report, unless it has been; *file: its path, relative to out_dir. */
 NODISCARD bool side_write(const struct validation *v, struct side *s, int stage, int look,
                           struct path *file, struct err *e);
-/* How a stored reference, which may have a manifest, is made anew. */
-struct renew renew_of(const struct validation *v, const struct side *s, const json_t *manifest);
+/* Appends the words of --suite and, of_goldens, --golden, with full paths, unless a command finds them by itself in any
+ * folder. */
+void side_add_places(const struct validation *v, bool of_goldens, json_t *words);
+/* The commands, for people, that make a stored reference anew: "assay golden render ...", and in the next line "assay golden
+ * approve ...", a new reference. NULL if out of memory, or if nobody knows what makes it: neither an engine of ours nor the one
+ * that is judged, which made what is stored (manifest; NULL: nothing), or whose name it has, or that and -VERSION. */
+json_t *side_renewal(const struct validation *v, const struct side *s, const json_t *manifest);
 void side_free(struct side *s);
 
 /* Does --only select any claim of a scene? All of them? */
