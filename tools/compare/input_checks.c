@@ -93,7 +93,7 @@ static bool check_shared(const struct moments *a, const struct moments *b, struc
     if (shared > 0)
         return err_set(
             e,
-            "A and B hold the same observations in %zu of %zu pixels: rendered with the same seed, or copied? (--paired judges them as pairs)",
+            "A and B hold the same observations in %zu of %zu pixels: rendered with the same seed, or copied?",
             shared, pixels);
     return true;
 }

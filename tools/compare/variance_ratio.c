@@ -155,6 +155,14 @@ size_t variance_ratio_shared(const struct moments *a, const struct moments *b)
     return p <= shared_level ? same : 0;
 }
 
+void variance_ratio_advise(const struct moments *a, const struct moments *b, const char *advice,
+                           struct err *e)
+{
+    const struct err why = *e;
+    if (a->width == b->width && a->height == b->height && variance_ratio_shared(a, b) > 0)
+        err_set(e, "%s (%s)", why.msg, advice);
+}
+
 double variance_ratio_of_difference(const struct moments *a, const struct moments *b)
 {
     size_t pixels = (size_t)a->width * (size_t)a->height;

@@ -16,6 +16,9 @@ const char *variance_ratio_of(const struct variance_ratio *v);
 /* In how many pixels A and B hold the same observations (all moments agree bit by bit, and there is
  * noise), or 0 if that many can agree by chance. */
 size_t variance_ratio_shared(const struct moments *a, const struct moments *b);
+/* Adds what helps there to the line by which compare_moments() refused that. */
+void variance_ratio_advise(const struct moments *a, const struct moments *b, const char *advice,
+                           struct err *e);
 
 /* The mean of (A - B)^2 over its stated variance, over pixels with noise and in the channel where it is largest: 1 for
  * equal and independent sides, less where they share their noise. Also 1 if it is more than 1/4, or if

@@ -3,7 +3,8 @@
 #include "reference/base/json_node.h"
 #include "reference/base/utc_date.h"
 #include "tools/compare/region.h"
-#include "tools/sequential/pair_noise.h"
+#include "tools/compare/variance_ratio.h"
+#include "tools/stats/pair_noise.h"
 
 #include <string.h>
 
@@ -183,7 +184,8 @@ static enum approval approve_compared(const struct pair *p, struct err *e)
 {
     struct comparison r;
     if (!compare(p, &r, e)) {
-        pair_noise_advise(e, "render the candidate with another --seed");
+        variance_ratio_advise(&p->candidate.m, &p->stored.m,
+                              "render the candidate with another --seed", e);
         err_prefix(e, "%s/%s: candidate (A) against stored (B)", p->scene->name, p->ref->engine);
         return APPROVE_IMPOSSIBLE;
     }

@@ -203,6 +203,8 @@ static bool run_moments(const struct compare_job *job, struct compared *out, str
                   : compare_moments(&p.in[0].m, &p.in[1].m, &opt, &out->r, e);
     if (ok)
         input_limit(&p.in[0], opt.tile, &out->r);
+    else
+        variance_ratio_advise(&p.in[0].m, &p.in[1].m, "--paired judges them as pairs", e);
     keep_pair(job->path, job->memory, &p, out);
     if (ok && two && out->r.verdict != VERDICT_DIFFERENT)
         input_notes_add(&out->notes, "nothing was flagged: %s and %s were not needed",

@@ -5,11 +5,12 @@
 #include "tools/base/data_dirs.h"
 
 #include "tools/compare/hint.h"
+#include "tools/compare/variance_ratio.h"
 #include "tools/results/claim_result.h"
 #include "tools/results/noise_results.h"
 #include "tools/results/stated_error_results.h"
 #include "tools/results/results.h"
-#include "tools/sequential/pair_noise.h"
+#include "tools/stats/pair_noise.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -319,8 +320,11 @@ static void look(struct validation *v, struct claim_run *t)
         return;
     }
     if (!ok) {
-        pair_noise_advise(&e, v->opt->engine != NULL ? "give another --reference-seed"
-                                                     : "give another --seed");
+        if (p.image[0] != NULL && p.image[1] != NULL)
+            variance_ratio_advise(&p.image[0]->m, &p.image[1]->m,
+                                  v->opt->engine != NULL ? "give another --reference-seed"
+                                                         : "give another --seed",
+                                  &e);
         finish_unseen(v, t, e.msg, false);
         return;
     }

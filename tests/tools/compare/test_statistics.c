@@ -536,7 +536,7 @@ TEST(test_shared_seeds)
             assert_string_equal(
                 e.msg,
                 fs_path("A and B hold the same observations in %d of 64 pixels: rendered with "
-                        "the same seed, or copied? (--paired judges them as pairs)",
+                        "the same seed, or copied?",
                         part == 0 ? 64 : 48)
                     .s);
     }

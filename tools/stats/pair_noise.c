@@ -1,6 +1,6 @@
 #include "pair_noise.h"
 
-#include "tools/stats/noise_estimate.h"
+#include "noise_estimate.h"
 
 #include <assert.h>
 #include <string.h>
@@ -46,12 +46,4 @@ double pair_noise_share(const struct moments *a, const struct moments *b)
 {
     const double of_a = total_variance(a), all = of_a + total_variance(b);
     return all > 0 ? of_a / all : 1;
-}
-
-void pair_noise_advise(struct err *e, const char *advice)
-{
-    const struct err why = *e;
-    const char *paired = strstr(why.msg, " (--paired");
-    if (paired != NULL)
-        err_set(e, "%.*s: %s", (int)(paired - why.msg), why.msg, advice);
 }

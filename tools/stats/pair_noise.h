@@ -16,7 +16,4 @@ NODISCARD bool pair_noise_estimate(const struct moments *a, const struct moments
 /* The share of side a in the variance of the difference, summed over pixels and channels; 1 where there is none. */
 double pair_noise_share(const struct moments *a, const struct moments *b);
 
-/* In a line that advises --paired, which only `compare` has, puts what helps here. */
-void pair_noise_advise(struct err *e, const char *advice);
-
 #endif
