@@ -62,6 +62,8 @@ UNFUZZED := $(addprefix renderer/,bvh shading transport pathtracer) reference/tr
   $(patsubst %/,%,$(sort $(dir $(wildcard reference/*/export_*.h)))) \
   $(addprefix tools/,stats compare sequential plots report validate converge commands)
 $(foreach d,$(UNFUZZED),$(eval $(BUILD)/clang/$(d)/%: OPT := -O0 -finstrument-functions))
+# A rubric's options are read as our renderer reads them.
+$(BUILD)/clang/renderer/pathtracer/options.c.o: OPT := $(SANITIZE),fuzzer-no-link
 $(foreach b,tsan cov,$(eval $(call tree,$(BUILD)/$(b),$(BUILD)/deps-test)))
 # Sanitizers see one lane, and eight or sixteen of the widest instructions here. SSE4.2 shares all but the operations on vectors with
 # AVX2, and has the bits of one lane (test_widths).

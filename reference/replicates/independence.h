@@ -28,25 +28,9 @@
 #ifndef ASSAY_INDEPENDENCE_H
 #define ASSAY_INDEPENDENCE_H
 
-#include "renderer/base/err.h"
+#include "replicates.h"
 
 #include <jansson.h>
-
-/* The luminance of the first MOST_REPLICATES replicates. */
-enum { MOST_REPLICATES = 1024, NUM_SQUARES = 4 };
-struct replicates {
-    int width, height, num, capacity;
-    float *luminance; /* num images of width*height */
-    double
-        sharing; /* variance of a sum of pixels over the sum of their variances, by a known filter; 0: 1 */
-};
-
-NODISCARD bool replicates_alloc(struct replicates *r, int width, int height, int count,
-                                struct err *e);
-void replicates_add(struct replicates *r, const float *pixels_rgb);
-void replicates_free(struct replicates *r);
-/* e[k], k < num, of one pixel; false if it has no noise. */
-bool replicates_residuals(const struct replicates *r, size_t pixel, double *e);
 
 /* Chance that independent replicates fail any of the four tests. Small, as a whole suite with both engines is
  * rendered again and again, and a replicate that was used twice is found at any alpha. */
@@ -55,6 +39,7 @@ bool replicates_residuals(const struct replicates *r, size_t pixel, double *e);
 /* While the test passes, an interval is too narrow by at most about the square root of this. */
 #define SQUARES_VARY_MOST 1.5
 
+enum { NUM_SQUARES = 4 };
 struct independence {
     bool tested;    /* false: fewer than 4 replicates or 64 noisy blocks */
     bool passed;    /* true also where not tested */

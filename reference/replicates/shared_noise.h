@@ -2,12 +2,12 @@
  * filter wider than one), a denoiser or a photon map make the noise of neighbours alike: sums over squares then vary
  * more than sums of independent pixels, and every interval that takes pixels for independent is too narrow.
  *
- * With e[k](p) as in independence.h: for a square of n noisy pixels, sum over k of (sum over p of e[k](p))^2 is n (K - 1)
+ * With e[k](p) as in replicates_residuals(): for a square of n noisy pixels, sum over k of (sum over p of e[k](p))^2 is n (K - 1)
  * on average if its pixels are independent, whatever the law. */
 #ifndef ASSAY_SHARED_NOISE_H
 #define ASSAY_SHARED_NOISE_H
 
-#include "independence.h"
+#include "replicates.h"
 
 enum { MOST_SQUARE_SIZES = 24 };
 /* Squares of one side that cut up the image. */

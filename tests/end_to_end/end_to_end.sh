@@ -581,7 +581,7 @@ bad_engine() { # NAME PATTERN SCRIPT
 pfm='printf "PF\n64 64\n-1.0\n";'
 bad_engine "exits with 1" "exit status 1: no light" 'echo no light; exit 1'
 bad_engine "hangs" "no end after 15 s" 'sleep 100'
-bad_engine "writes nothing" "replicate_0000.pfm: cannot read" ':'
+bad_engine "writes nothing" "wrote no image, .*replicate_0000.pfm is not there" ':'
 bad_engine "writes garbage" "replicate_0000.pfm" 'echo garbage >$4'
 bad_engine "writes another size" "3 x 1 pixels, not 64 x 64" \
     'printf "PF\n3 1\n-1.0\n123456789012123456789012123456789012" >$4'

@@ -1,5 +1,6 @@
 /* The test of replicates' independence: its false alarm rate, and that dependent replicates are found. The
  * replicates are drawn here, from the distributions of simulate.h. */
+#include "reference/replicates/independence.h"
 #include "reference/replicates/shared_noise.h"
 #include "tests/support/simulate.h"
 #include "tests/support/test.h"
