@@ -27,6 +27,8 @@ struct suite_reference {
                              settings) or "approximate" */
     double margin_global; /* largest relative difference of the image mean that counts as equal */
     double margin_tile;   /* the same for one tile */
+    double
+        margin_variance; /* the same for the variance of a path, either way; 0: it is not judged */
     int replicates; /* engines: images with a seed of their own; 0: as many as its description says */
     int spp;        /* samples per pixel of one replicate (0 likewise), or */
     int subgrid;    /* k, if engine_kind.subgrid: a replicate is a box-averaged (k W) x (k H) image */

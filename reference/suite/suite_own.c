@@ -47,21 +47,27 @@ static bool read_path(const struct json_node *n, const char *key, const char *di
            err_set(e, "%s: '%s%s' is '%s', which cannot be read", n->file, n->at, key, out);
 }
 
+/* As in struct suite_reference. */
+struct margins {
+    double global, tile, variance;
+};
+
 /* "margin" is the image's, and the tile's is four times that (at most 0.99); either can be set by its own key. */
-static bool read_margins(const struct json_node *n, double *global, double *tile, struct err *e)
+static bool read_margins(const struct json_node *n, struct margins *m, struct err *e)
 {
     if (json_has(n, "margin")) {
-        if (!json_get_number(n, "margin", 0, 1, global, e))
+        if (!json_get_number(n, "margin", 0, 1, &m->global, e))
             return false;
-        *tile = fmin(4 * *global, 0.99);
+        m->tile = fmin(4 * m->global, 0.99);
     }
-    return json_may_number(n, "margin_global", 0, 1, global, e) &&
-           json_may_number(n, "margin_tile", 0, 1, tile, e);
+    return json_may_number(n, "margin_global", 0, 1, &m->global, e) &&
+           json_may_number(n, "margin_tile", 0, 1, &m->tile, e) &&
+           json_may_number(n, "margin_variance", 0, 100, &m->variance, e);
 }
 
-/* r's margins are preset to the scene's. */
-static bool read_reference(const struct json_node *n, const char *name, struct suite_scene *s,
-                           struct suite_reference *r, struct err *e)
+/* m: the scene's margins. */
+static bool read_reference(const struct json_node *n, const char *name, struct margins m,
+                           struct suite_scene *s, struct suite_reference *r, struct err *e)
 {
     const struct engine_kind *kind = engine_with_goldens(name);
     const bool truth = strcmp(name, "truth") == 0, ours = strcmp(name, "pathtracer") == 0;
@@ -70,6 +76,7 @@ static bool read_reference(const struct json_node *n, const char *name, struct s
                                 "margin",
                                 "margin_global",
                                 "margin_tile",
+                                "margin_variance",
                                 truth  ? "values"
                                 : grid ? "subgrid"
                                        : "spp",
@@ -80,9 +87,11 @@ static bool read_reference(const struct json_node *n, const char *name, struct s
     snprintf(r->engine, sizeof r->engine, "%s", name);
     strcpy(r->fidelity, "exact");
     if (!json_only_keys(n, keys, e) ||
-        !json_may_text(n, "class", r->fidelity, sizeof r->fidelity, e) ||
-        !read_margins(n, &r->margin_global, &r->margin_tile, e))
+        !json_may_text(n, "class", r->fidelity, sizeof r->fidelity, e) || !read_margins(n, &m, e))
         return false;
+    r->margin_global = m.global;
+    r->margin_tile = m.tile;
+    r->margin_variance = m.variance;
     if (!suite_json_check_class(n, r, e))
         return false;
     if (!(r->margin_global > 0) || !(r->margin_tile > 0))
@@ -111,14 +120,14 @@ static json_t *merge_references(const json_t *of_suite, const json_t *of_scene)
     return all;
 }
 
-static bool read_references(const struct json_node *scene, struct suite_scene *s, double global,
-                            double tile, struct err *e)
+static bool read_references(const struct json_node *scene, struct suite_scene *s, struct margins m,
+                            struct err *e)
 {
     const char *name;
     json_t *value;
     json_object_foreach(json_object_get(scene->object, "references"), name, value) {
         char at[256];
-        struct suite_reference r = {.margin_global = global, .margin_tile = tile};
+        struct suite_reference r = {0};
         snprintf(at, sizeof at, "%sreferences.", scene->at);
         const struct json_node list = {scene->file, at, NULL};
         if (json_is_null(value))
@@ -133,7 +142,7 @@ static bool read_references(const struct json_node *scene, struct suite_scene *s
         if (s->num_references == MAX_REFERENCES)
             return err_set(e, "%s: '%sreferences' has more than %d", scene->file, scene->at,
                            MAX_REFERENCES);
-        if (!read_reference(&n, name, s, &r, e))
+        if (!read_reference(&n, name, m, s, &r, e))
             return false;
         s->reference[s->num_references++] = r;
     }
@@ -165,15 +174,17 @@ static bool read_expected(const struct json_node *n, struct suite_scene *s, stru
                    expect);
 }
 
-/* s->name and s->json are set; global and tile are the suite's margins. */
-static bool read_scene(const struct json_node *n, const char *dir, double global, double tile,
+/* s->name and s->json are set; m: the suite's margins. */
+static bool read_scene(const struct json_node *n, const char *dir, struct margins m,
                        struct suite_scene *s, struct err *e)
 {
     static const char *const keys[] = {
-        "file",           "uses",       "width",       "height",        "depth",
-        "tile",           "margin",     "references",  "margin_tile",   "margin_global",
-        "title",          "detects",    "expect",      "blind_to",      "environment",
-        "focal_distance", "convention", "lens_radius", "references_of", NULL};
+        "file",        "uses",          "width",         "height",
+        "depth",       "tile",          "margin",        "references",
+        "margin_tile", "margin_global", "title",         "detects",
+        "expect",      "blind_to",      "environment",   "focal_distance",
+        "convention",  "lens_radius",   "references_of", "margin_variance",
+        NULL};
     s->tile = 16;
     s->depth = 5;
     s->spp = 256;
@@ -187,7 +198,7 @@ static bool read_scene(const struct json_node *n, const char *dir, double global
         !json_may_text(n, "detects", s->detects, sizeof s->detects, e) ||
         !json_may_text(n, "blind_to", s->blind_to, sizeof s->blind_to, e) ||
         !json_may_text(n, "convention", s->convention, sizeof s->convention, e) ||
-        !read_expected(n, s, e) || !read_margins(n, &global, &tile, e))
+        !read_expected(n, s, e) || !read_margins(n, &m, e))
         return false;
     const char *dot = strrchr(s->dae, '.');
     s->is_opaque = dot == NULL || strcmp(dot, ".dae") != 0;
@@ -201,7 +212,7 @@ static bool read_scene(const struct json_node *n, const char *dir, double global
         !read_path(n, "environment", dir, s->environment, sizeof s->environment, e))
         return false;
     return suite_json_read_lens(n, s, e) &&
-           (strcmp(s->references_of, s->name) != 0 || read_references(n, s, global, tile, e));
+           (strcmp(s->references_of, s->name) != 0 || read_references(n, s, m, e));
 }
 
 static int by_name(const void *a, const void *b)
@@ -212,11 +223,11 @@ static int by_name(const void *a, const void *b)
 static bool read_scenes(const struct json_node *n, const char *dir, json_t *scenes,
                         struct suite *out, struct err *e)
 {
-    double global = 0, tile = 0;
+    struct margins m = {0};
     const json_t *references = json_object_get(n->object, "references");
     json_t *value;
     const char *name;
-    if (!read_margins(n, &global, &tile, e))
+    if (!read_margins(n, &m, e))
         return false;
     json_object_foreach(scenes, name, value) {
         char at[256];
@@ -235,7 +246,7 @@ static bool read_scenes(const struct json_node *n, const char *dir, json_t *scen
         if (json_has(&scene, "references") || !json_has(&scene, "references_of"))
             json_object_set_new(s->json, "references",
                                 merge_references(references, json_object_get(value, "references")));
-        if (!read_scene(&scene, dir, global, tile, s, e))
+        if (!read_scene(&scene, dir, m, s, e))
             return false;
     }
     return true;
@@ -243,9 +254,9 @@ static bool read_scenes(const struct json_node *n, const char *dir, json_t *scen
 
 bool suite_own_read(const char *dir, struct suite *out, struct err *e)
 {
-    static const char *const keys[] = {"version",       "engine",      "margin",
-                                       "margin_global", "margin_tile", "references",
-                                       "scenes",        "comment",     NULL};
+    static const char *const keys[] = {
+        "version",         "engine",     "margin", "margin_global", "margin_tile",
+        "margin_variance", "references", "scenes", "comment",       NULL};
     char file[4096], comment[4096];
     int version = 1;
     int length = snprintf(file, sizeof file, "%s/suite.json", dir);

@@ -151,6 +151,16 @@ expect "is what it is compared with" 0 "all as it should be, 1 the same" env -C 
 sed -i 's/tent:1/tent:2/' tent/mine.json
 expect "but not under another" 3 "stored with the pixel filter tent:1, not tent:2" env -C tent assay validate -q
 
+# A margin of the variance: three quarters of the samples, 4/3 of the variance, change no mean, and are found; without
+# that margin they are not (control).
+cp -r begun noisier
+sed -i 's/-s "$4"/-s $(($4 * 3 \/ 4))/' noisier/mine.sh
+expect "without one, more noise passes" 0 "all as it should be, 1 the same" env -C noisier assay validate -q
+sed -i 's/"margin"/"margin_variance": 0.2, &/' noisier/suite.json
+expect "with one it does not" 1 "mine is more noisy, 1.[23][0-9]* times the variance on cornell" env -C noisier assay validate -q
+cp begun/mine.sh noisier
+expect "and what is as noisy as before passes" 0 "all as it should be, 1 the same" env -C noisier assay validate -q
+
 # A version: the page of many runs names it.
 cp -r begun versioned
 sed -i 's/"format"/"version": ["echo", "mine 1.4-7"], "format"/' versioned/mine.json

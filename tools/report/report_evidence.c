@@ -49,6 +49,9 @@ static void write_numbers(FILE *f, const json_t *claim)
                    html_percent_plain(member_number(claim, "margin_tile")).s);
     else
         write_fact(f, "Margin (counts as equal)", "none declared");
+    if (member_number(claim, "margin_variance") > 0)
+        write_fact(f, "Margin of the variance", "%s, either way",
+                   html_percent_plain(member_number(claim, "margin_variance")).s);
     write_fact(f, "Smallest bias this run would find", "%s of the image mean, %s of a tile",
                region_mdb_text(member_number(claim, "mdb_global"), image),
                region_mdb_text(member_number(claim, "mdb_tile"), tile));

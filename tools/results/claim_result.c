@@ -67,17 +67,19 @@ static const char *unless_empty(const char *text)
 static json_t *claim_head(const struct claim_context *c)
 {
     const struct suite_scene *s = c->scene;
-    json_t *accepted = NULL;
+    json_t *accepted = NULL, *variance = NULL;
+    if (c->opt.margin_variance > 0)
+        variance = json_real(c->opt.margin_variance);
     if (c->accept_mdb[0] > 0)
         accepted = json_pack("[f, f]", c->accept_mdb[0], c->accept_mdb[1]);
     return json_pack("{s:s, s:s, s:s, s:s, s:s, s:f, s:f, s:f, s:i, s:s*, s:s*, s:s*, s:o*, s:s*, "
-                     "s:s*}",
+                     "s:s*, s:o*}",
                      "scene", s ? s->name : "files", "quantity", "mean", "a", c->a, "b", c->b,
                      "expected", verdict_name(c->expected), "alpha", c->opt.alpha, "margin_global",
                      c->opt.margin_global, "margin_tile", c->opt.margin_tile, "tile", c->opt.tile,
                      "title", s ? s->title : NULL, "detects", s ? unless_empty(s->detects) : NULL,
                      "blind_to", s ? unless_empty(s->blind_to) : NULL, "accept_mdb", accepted,
-                     "class", c->fidelity, "rerun", c->rerun);
+                     "class", c->fidelity, "rerun", c->rerun, "margin_variance", variance);
 }
 
 bool claim_result_passes(const struct claim_context *c, const struct comparison *r)
@@ -162,7 +164,7 @@ static const struct shape judged_shape = {
     .names =
         {[IS_TEXT] = "quantity verdict reason class? unit_b? version_a? version_b? renew?",
          [IS_NUMBER] =
-             "alpha margin_global margin_tile difference log10_p mdb_global mdb_tile rms_bias extra_factor noise_share_a? n_a? n_b? spp_b? seconds_a? seconds_b?",
+             "alpha margin_global margin_tile margin_variance? difference log10_p mdb_global mdb_tile rms_bias extra_factor noise_share_a? n_a? n_b? spp_b? seconds_a? seconds_b?",
          [IS_COUNT] = "tile num_tests tiles_x tiles_y seed_a?",
          [IS_BOOLEAN] = "skew_limited",
          [IS_INTERVAL] = "ci accept_mdb?",

@@ -32,6 +32,20 @@ static struct plain_words amount(double difference)
     return w;
 }
 
+/* "more noisy, 1.9 times the variance"; empty if it is within its margin or has none. */
+static struct plain_words noisier(const json_t *claim)
+{
+    struct plain_words w = {""};
+    const json_t *ratio = json_object_get(claim, "variance_ratio");
+    const double limit = 1 + member_number(claim, "margin_variance"),
+                 lo = json_number_value(json_array_get(json_object_get(ratio, "ci"), 0)),
+                 hi = json_number_value(json_array_get(json_object_get(ratio, "ci"), 1));
+    if (ratio != NULL && limit > 1 && (lo > limit || hi < 1 / limit))
+        snprintf(w.s, sizeof w.s, "%s noisy, %.3g times the variance", lo > limit ? "more" : "less",
+                 member_number(ratio, "ratio"));
+    return w;
+}
+
 static struct plain_words place(const json_t *region)
 {
     struct plain_words w;
@@ -54,6 +68,8 @@ static struct plain_words too_bright(const json_t *claim)
                  place(tile).s);
         return w;
     }
+    if (noisier(claim).s[0] != '\0')
+        return noisier(claim);
     const double difference = member_number(worst, "difference");
     const int channel = (int)member_number(worst, "channel");
     if (difference == 0 || member_number(worst, "width") == 0)

@@ -69,6 +69,7 @@ static struct compare_options options_of(const struct claim_run *t, double alpha
     return (struct compare_options){.alpha = alpha,
                                     .margin_global = t->ref.margin_global,
                                     .margin_tile = t->ref.margin_tile,
+                                    .margin_variance = t->ref.margin_variance,
                                     .tile = t->scene->tile};
 }
 

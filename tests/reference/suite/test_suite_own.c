@@ -6,12 +6,12 @@
 #include "renderer/base/fs.h"
 
 static const char good[] =
-    "{'version': 1, 'engine': 'mine.json', 'margin': 0.01,\n"
+    "{'version': 1, 'engine': 'mine.json', 'margin': 0.01, 'margin_variance': 0.5,\n"
     " 'references': {'mine-1.4': {'spp': 64}},\n"
     " 'scenes': {\n"
     "  'room': {'file': 'room.xml', 'uses': ['wood.png'], 'width': 64, 'height': 32},\n"
     "  'ball': {'file': 'ball.dae', 'width': 64, 'height': 32, 'depth': 1, 'margin': 0.3,\n"
-    "           'references': {'mine-1.4': {'replicates': 128, 'margin_tile': 0.5},\n"
+    "           'references': {'mine-1.4': {'replicates': 128, 'margin_tile': 0.5, 'margin_variance': 2},\n"
     "                          'povray': {'replicates': 8, 'subgrid': 2}}},\n"
     "  'dark': {'file': 'ball.dae', 'width': 64, 'height': 32, 'expect': 'DIFFERENT',\n"
     "           'references_of': 'ball'}\n"
@@ -50,12 +50,14 @@ TEST(a_suite_of_ones_own_is_read)
     assert_string_equal(room->reference[0].engine, "mine-1.4");
     assert_string_equal(room->reference[0].fidelity, "exact");
     assert_true(room->reference[0].margin_global == 0.01 && room->reference[0].margin_tile == 0.04);
+    assert_true(room->reference[0].margin_variance == 0.5);
     assert_int_equal(room->reference[0].spp, 64);
     assert_int_equal(room->reference[0].replicates, 0);
     const struct suite_reference *mine = suite_reference_of(ball, "mine-1.4"),
                                  *povray = suite_reference_of(ball, "povray");
     assert_int_equal(ball->num_references, 2);
-    assert_true(mine->margin_global == 0.3 && mine->margin_tile == 0.5);
+    assert_true(mine->margin_global == 0.3 && mine->margin_tile == 0.5 &&
+                mine->margin_variance == 2);
     assert_int_equal(mine->spp, 64);
     assert_int_equal(mine->replicates, 128);
     assert_true(povray->margin_tile == 0.99); /* four times 0.3, but below 1 */
@@ -88,6 +90,8 @@ static const struct fault {
     {"'mine.json'", "'gone.json'", "gone.json', which cannot be read"},
     {"'mine.json'", "7", "suite.json: 'engine' is not a text"},
     {"'margin': 0.01", "'margin': 1", "suite.json: 'margin' is 1, not between 0 and 1"},
+    {"'margin_variance': 2", "'margin_variance': 0",
+     "margin_variance' is 0, not between 0 and 100"},
     {"'margin': 0.01,", "",
      "suite.json: 'scenes.room.references.mine-1.4.margin' is given neither"},
     {"'references': {'mine-1.4'", "'references': {'mine 1.4'",

@@ -59,6 +59,21 @@ TEST(who_how_much_and_where)
         "no difference of mine was found on 12_point_plane (against truth); 1.23 % would have been");
 }
 
+TEST(how_noisy)
+{
+    json_auto_t *c = claim_of("DIFFERENT", "EQUIVALENT", 0, -0.001, 0.001, 3);
+    json_object_update_new(c, json_pack("{sf s{sf s[ff]}}", "margin_variance", 0.3,
+                                        "variance_ratio", "ratio", 1.9, "ci", 1.7, 2.1));
+    assert_non_null(
+        strstr(plain_words_claim(c).s, "mine is more noisy, 1.9 times the variance on"));
+    json_object_update_new(
+        c, json_pack("{s{sf s[ff]}}", "variance_ratio", "ratio", 0.5, "ci", 0.4, 0.6));
+    assert_non_null(
+        strstr(plain_words_claim(c).s, "mine is less noisy, 0.5 times the variance on"));
+    json_object_set_new(c, "margin_variance", json_real(2));
+    assert_null(strstr(plain_words_claim(c).s, "noisy"));
+}
+
 /* extra_factor 2.5 is of both sides. Where a share s of the variance is that of A, A alone needs s/(1/2.5 - (1 - s)) times
  * its samples: 3 for s = 0.9. Where it needs more than twice as many as
  * it would together with B, both are named. */
