@@ -7,6 +7,7 @@
 #include "tools/plots/plot.h"
 #include "tools/results/results.h"
 
+#include <assert.h>
 #include <math.h>
 #include <string.h>
 
@@ -48,6 +49,7 @@ static bool find_ends(const struct history_series *s, enum quantity q, struct pl
 static void write_plot(FILE *f, const struct history *h, const struct history_series *s,
                        enum quantity q)
 {
+    assert(q < NUM_QUANTITIES);
     struct plot plot = {.f = f,
                         .style = "trend",
                         .left = 6,
@@ -71,7 +73,7 @@ static void write_plot(FILE *f, const struct history *h, const struct history_se
     for (size_t i = 0; i < s->num; i++) {
         const struct history_point *p = &s->point[i];
         double v = value_of(p, q), run = (double)p->run;
-        char version[128] = "";
+        char version[128];
         if (!isfinite(v))
             continue;
         plot_line_to(&plot, run, v);
@@ -119,7 +121,7 @@ static void write_csv(FILE *f, const struct history *h)
         const struct history_series *s = &h->series[i];
         for (size_t k = 0; k < s->num; k++) {
             const struct history_point *p = &s->point[k];
-            char version[128] = "";
+            char version[128];
             if (p->run < from)
                 continue;
             history_version(&h->run[p->run], version, sizeof version);
@@ -168,7 +170,7 @@ static void write_runs(FILE *f, const struct history *h)
     for (size_t r = h->num_runs; r-- > 0;) {
         const json_t *root = h->run[r].results, *claims = json_object_get(root, "claims");
         const size_t num = json_array_size(claims), good = num - num_wrong(&h->run[r]);
-        char version[128] = "";
+        char version[128];
         history_version(&h->run[r], version, sizeof version);
         html_row_open(f, good < num, html_date(member_text(root, "date")).s);
         html_print(f,
