@@ -6,6 +6,7 @@
 #include "tools/html/csv_link.h"
 #include "tools/html/html.h"
 #include "tools/plots/plot_interval.h"
+#include "tools/results/plain_words.h"
 #include "tools/results/results_table.h"
 
 #include <assert.h>
@@ -60,7 +61,8 @@ static void write_cell(FILE *f, const struct column *column, const struct claim_
         if (strcmp(member_text(c, "verdict"), "DIFFERENT") == 0 &&
             fabs(member_end(c, "ci", 0)) < member_number(c, "margin_global") &&
             fabs(member_end(c, "ci", 1)) < member_number(c, "margin_global"))
-            fputs("<small>because of a part of it</small>", f);
+            fprintf(f, "<small>because of %s</small>",
+                    plain_words_noise(c).s[0] != '\0' ? "its noise" : "a part of it");
         break;
     case COLUMN_DIFFERENCE: fputs(html_percent_column(member_number(c, key)).s, f); break;
     case COLUMN_INTERVAL:

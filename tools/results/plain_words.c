@@ -32,8 +32,7 @@ static struct plain_words amount(double difference)
     return w;
 }
 
-/* "more noisy, 1.9 times the variance"; empty if it is within its margin or has none. */
-static struct plain_words noisier(const json_t *claim)
+struct plain_words plain_words_noise(const json_t *claim)
 {
     struct plain_words w = {""};
     const json_t *ratio = json_object_get(claim, "variance_ratio");
@@ -68,8 +67,8 @@ static struct plain_words too_bright(const json_t *claim)
                  place(tile).s);
         return w;
     }
-    if (noisier(claim).s[0] != '\0')
-        return noisier(claim);
+    if (plain_words_noise(claim).s[0] != '\0')
+        return plain_words_noise(claim);
     const double difference = member_number(worst, "difference");
     const int channel = (int)member_number(worst, "channel");
     if (difference == 0 || member_number(worst, "width") == 0)

@@ -16,6 +16,9 @@ struct plain_words {
  * undecided or not judged. */
 struct plain_words plain_words_claim(const json_t *claim);
 
+/* "more noisy, 1.9 times the variance"; empty if the variance is within its margin or has none. */
+struct plain_words plain_words_noise(const json_t *claim);
+
 /* What would decide an undecided claim, "about 2.5 times the samples would decide: 40 replicates"; says so if the
  * reference needs more, too. Empty where nobody knows. */
 struct plain_words plain_words_more_samples(const json_t *claim);

@@ -70,7 +70,9 @@ TEST(how_noisy)
         c, json_pack("{s{sf s[ff]}}", "variance_ratio", "ratio", 0.5, "ci", 0.4, 0.6));
     assert_non_null(
         strstr(plain_words_claim(c).s, "mine is less noisy, 0.5 times the variance on"));
+    assert_string_equal(plain_words_noise(c).s, "less noisy, 0.5 times the variance");
     json_object_set_new(c, "margin_variance", json_real(2));
+    assert_string_equal(plain_words_noise(c).s, "");
     assert_null(strstr(plain_words_claim(c).s, "noisy"));
 }
 
