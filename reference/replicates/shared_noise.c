@@ -30,17 +30,16 @@ static void sum_pixels(const struct replicates *r, double *e, struct level *l)
         }
 }
 
-/* Sums 2 x 2 squares of one plane, in place. */
-static void halve(double *plane, int nx, int ny)
+/* Sums 2 x 2 squares of one plane; it may be written over, or what lies before it. */
+static void halve(const double *plane, int nx, int ny, double *to)
 {
-    size_t to = 0;
     for (int y = 0; y < ny; y += 2)
         for (int x = 0; x < nx; x += 2) {
             double sum = 0;
             for (int i = 0; i < 4; i++)
                 if (x + i % 2 < nx && y + i / 2 < ny)
                     sum += plane[(size_t)(y + i / 2) * (size_t)nx + (size_t)(x + i % 2)];
-            plane[to++] = sum;
+            *to++ = sum;
         }
 }
 
@@ -48,16 +47,18 @@ static void coarsen(struct level *l)
 {
     const size_t stride = (size_t)l->nx * (size_t)l->ny;
     const int nx = (l->nx + 1) / 2, ny = (l->ny + 1) / 2;
-    halve(l->pixels, l->nx, l->ny);
-    for (int k = 0; k < l->num; k++) {
-        double *plane = l->sum + (size_t)k * stride,
-               *to = l->sum + (size_t)k * (size_t)nx * (size_t)ny;
-        halve(plane, l->nx, l->ny);
-        for (size_t i = 0; i < (size_t)nx * (size_t)ny; i++)
-            to[i] = plane[i];
-    }
+    halve(l->pixels, l->nx, l->ny, l->pixels);
+    for (int k = 0; k < l->num; k++)
+        halve(l->sum + (size_t)k * stride, l->nx, l->ny,
+              l->sum + (size_t)k * (size_t)nx * (size_t)ny);
     l->nx = nx;
     l->ny = ny;
+}
+
+/* log10 of the chi-square tail beyond x, at least -300. */
+static double log10_tail(double x, double dof)
+{
+    return log10(fmax(1e-300, gsl_cdf_chisq_Q(x, dof)));
 }
 
 /* Pairs of pixels p, q in one square: C = sum over k of e_k(p) e_k(q) has the mean 0 and, over permutations of one
@@ -82,7 +83,7 @@ static struct square_noise measure(const struct level *l, int side)
     s.se = 1 / sqrt(pairs * freedom);
     s.ratio = 1 + 2 * products / (pixels * freedom);
     double x = s.dof + s.r / s.se * sqrt(2 * s.dof);
-    s.log10_p = x > 0 ? log10(fmax(1e-300, gsl_cdf_chisq_Q(x, s.dof))) : 0;
+    s.log10_p = x > 0 ? log10_tail(x, s.dof) : 0;
     return s;
 }
 
@@ -130,7 +131,7 @@ double shared_noise_factor(const struct shared_noise *s, double alpha,
         *unlimited = largest;
     /* What the largest squares would show if that were all; as sharing is shown, sqrt(alpha) is rare enough. */
     for (const struct square_noise *q = largest + 1; q < s->square + s->num; q++)
-        if (log10(fmax(1e-300, gsl_cdf_chisq_Q(q->dof * q->ratio / factor, q->dof))) <= level / 2)
+        if (log10_tail(q->dof * q->ratio / factor, q->dof) <= level / 2)
             *unlimited = q;
     return factor;
 }

@@ -160,9 +160,15 @@ bool region_testable(const struct judge *j, const struct measured *m)
            is_within(j, m, fmax(m->skew, m->skew_around), skew_limit_raised, largest_gx);
 }
 
+/* How far |d| lies beyond margin and tolerance. */
+static double excess_of(const struct measured *m)
+{
+    return fabs(m->d) - m->margin * m->unit - m->tolerance;
+}
+
 double region_excess_t(const struct measured *m)
 {
-    return (fabs(m->d) - m->margin * m->unit - m->tolerance) / sqrt(m->v_margin);
+    return excess_of(m) / sqrt(m->v_margin);
 }
 
 /* log10 of the chance that observations as bright as any seen would all have been missed, if they
@@ -208,7 +214,7 @@ static double raised_log10_p(const struct measured *m, double t, double skew)
 
 double region_log10_p(const struct judge *j, const struct measured *m, int channel)
 {
-    double excess = fabs(m->d) - m->margin * m->unit - m->tolerance;
+    double excess = excess_of(m);
     if (m->noise_free)
         return log10_p_noise_free(j, m, excess, channel);
     double log10_p = raised_log10_p(m, fmax(0, region_excess_t(m)), skew_of_p(j, m));
@@ -220,8 +226,7 @@ double region_missed_z(const struct judge *j, const struct measured *m, int chan
 {
     if (!m->may_have_missed)
         return INFINITY;
-    double excess = fabs(m->d) - m->margin * m->unit - m->tolerance;
-    double log10_p = log10_p_missed(j, m, excess, channel);
+    double log10_p = log10_p_missed(j, m, excess_of(m), channel);
     return log10_p < -300 ? INFINITY : stats_normal_quantile(pow(10, log10_p) / 2);
 }
 
@@ -354,8 +359,9 @@ struct region region_fill(const struct judge *j, const struct cell *cell, struct
         out.ci_valid = half_width(j, &m, &x);
         half += x * sqrt(m.v_margin);
         /* The factor at the widened quantile, from which the search for it leaves. */
-        out.unskew_interval = samples_for(m.skew, stats_normal_quantile(j->opt.alpha * exp(-1)),
-                                          skew_limit_widened, INFINITY);
+        if (!out.ci_valid)
+            out.unskew_interval = samples_for(m.skew, stats_normal_quantile(j->opt.alpha * exp(-1)),
+                                              skew_limit_widened, INFINITY);
         out.unskew_test =
             samples_for(m.skew, j->z_guard[m.statistic], skew_limit_raised, largest_gx);
     }

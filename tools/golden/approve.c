@@ -164,11 +164,11 @@ static enum approval refuse_undecided(const struct pair *p, double factor)
                 times);
         return APPROVE_BETTER;
     }
-    const double share = pair_noise_share(a, b), left = 1 / factor - (1 - share);
-    if (!pair_noise_is_unknown(a, b) && left * verdict_largest_factor > share)
+    const double alone = pair_noise_samples_of_a(pair_noise_share(a, b), factor);
+    if (!pair_noise_is_unknown(a, b) && alone < verdict_largest_factor)
         fprintf(p->out,
                 "  refused: about %.1f times the replicates of the candidate would decide\n",
-                share / left);
+                alone);
     else
         fprintf(
             p->out,

@@ -1,6 +1,7 @@
 #include "plain_words.h"
 
 #include "tools/compare/verdict.h"
+#include "tools/stats/pair_noise.h"
 
 #include <math.h>
 #include <string.h>
@@ -102,9 +103,10 @@ struct plain_words plain_words_more_samples(const json_t *claim)
     struct plain_words w = {""};
     const double factor = member_number(claim, "extra_factor");
     const json_t *share = json_object_get(claim, "noise_share_a");
-    const double a = share != NULL ? json_number_value(share) : 1, left = 1 / factor - (1 - a);
-    const bool both = left * 2 * factor < a, in_words = factor >= verdict_largest_factor;
-    const double times = both || in_words ? factor : a / left;
+    const double alone =
+        pair_noise_samples_of_a(share != NULL ? json_number_value(share) : 1, factor);
+    const bool both = alone > 2 * factor, in_words = factor >= verdict_largest_factor;
+    const double times = both || in_words ? factor : alone;
     char more[128];
     if (!(factor > 1)) /* 1: nobody knows */
         return w;

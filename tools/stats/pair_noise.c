@@ -3,6 +3,7 @@
 #include "noise_estimate.h"
 
 #include <assert.h>
+#include <math.h>
 #include <string.h>
 
 bool pair_noise_is_unknown(const struct moments *a, const struct moments *b)
@@ -46,4 +47,10 @@ double pair_noise_share(const struct moments *a, const struct moments *b)
 {
     const double of_a = total_variance(a), all = of_a + total_variance(b);
     return all > 0 ? of_a / all : 1;
+}
+
+double pair_noise_samples_of_a(double share_a, double times)
+{
+    const double left = 1 / times - (1 - share_a);
+    return left > 0 ? share_a / left : INFINITY;
 }

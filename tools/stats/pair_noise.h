@@ -16,4 +16,7 @@ NODISCARD bool pair_noise_estimate(const struct moments *a, const struct moments
 /* The share of side a in the variance of the difference, summed over pixels and channels; 1 where there is none. */
 double pair_noise_share(const struct moments *a, const struct moments *b);
 
+/* How many times the samples of side a alone leave as little noise as `times` those of both; INFINITY: no number does. */
+double pair_noise_samples_of_a(double share_a, double times);
+
 #endif
