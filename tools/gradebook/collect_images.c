@@ -126,6 +126,9 @@ struct purchases {
     double left_s;
     double tried[RUBRIC_IMAGES][MOST_RUNS]; /* samples of the runs of an image */
     int num[RUBRIC_IMAGES];
+    struct longest { /* the run with most samples: its time a sample holds least of the start's */
+        double spp, cpu_s, wall_s;
+    } longest[RUBRIC_IMAGES];
     struct submitted_image first[RUBRIC_IMAGES], last[RUBRIC_IMAGES]; /* of its runs */
     bool stuck[RUBRIC_IMAGES]; /* no further run is possible */
 };
@@ -140,21 +143,22 @@ static bool was_tried(const double *tried, int num, double spp)
 
 /* Says why an image has no further run: it has had the most, a longer one might be killed, or there is no other number
  * of samples. */
-static void tell_no_more(const struct collect *c, struct submitted_images *h, int image)
+static void tell_no_more(const struct collect *c, const struct longest *run,
+                         struct submitted_images *h, int image)
 {
     const struct rubric_image *p = &c->job->rubric->image[image];
     const struct sandbox_limits *limit = &c->job->rubric->limit;
-    const struct made *made = &h->made[image];
     const int most = rubric_is_adaptive(p) ? MOST_ADAPTIVE : MOST_RUNS;
-    const double cpu = made->cpu_s / limit->cpu_s, wall = made->wall_s / limit->wall_s;
+    const double grows = 64 * p->spp / run->spp; /* the most samples over this run's */
+    const double cpu = run->cpu_s / limit->cpu_s, wall = run->wall_s / limit->wall_s;
     char *why = h->no_more[image];
     if (h->runs[image] >= most)
         snprintf(why, sizeof *h->no_more, "'%s' has had %d runs, the most", p->name, most);
-    else if (fmax(cpu, wall) > 1.0 / 128) /* else limits would allow 64 times the samples */
+    else if (grows * fmax(cpu, wall) > 0.5)
         snprintf(why, sizeof *h->no_more,
-                 "a longer run of '%s' might not end within 'limit %s %g': the first took %.2g s",
+                 "a longer run of '%s' might not end within 'limit %s %g': %g samples took %.2g s",
                  p->name, wall > cpu ? "wall" : "cpu", wall > cpu ? limit->wall_s : limit->cpu_s,
-                 wall > cpu ? made->wall_s : made->cpu_s);
+                 run->spp, wall > cpu ? run->wall_s : run->cpu_s);
     else
         snprintf(why, sizeof *h->no_more,
                  "'%s' has no further run with another number of samples that would help", p->name);
@@ -167,18 +171,16 @@ static int next_samples(const struct collect *c, const struct purchases *b,
 {
     const struct rubric_image *p = &c->job->rubric->image[image];
     const struct sandbox_limits *limit = &c->job->rubric->limit;
-    const struct made *made = &h->made[image];
+    const struct longest *run = &b->longest[image];
     double base = p->spp, has = h->image[image].spp, batch = rubric_option(p, "-a", 0),
-           largest = base;
+           largest = run->spp;
     double wanted = (more - 1) * has * 1.2, most = 64 * base;
     int root = (int)lround(sqrt(base)), num = h->runs[image], best = 0;
     if (num >= (rubric_is_adaptive(p) ? MOST_ADAPTIVE : MOST_RUNS) || base < 2)
         return 0;
-    for (int k = 0; k < num; k++)
-        largest = fmax(largest, b->tried[image][k]);
     most = fmin(most, 2.9 * largest); /* so that two runs are left to measure noise */
-    most = fmin(most, 0.5 * base * limit->cpu_s / fmax(0.02, made->cpu_s));
-    most = fmin(most, 0.5 * base * limit->wall_s / fmax(0.02, made->wall_s));
+    most = fmin(most, 0.5 * largest * limit->cpu_s / fmax(0.02, run->cpu_s));
+    most = fmin(most, 0.5 * largest * limit->wall_s / fmax(0.02, run->wall_s));
     if (rubric_is_adaptive(p))
         wanted = base;
     else if (batch > base)
@@ -196,10 +198,9 @@ static int next_samples(const struct collect *c, const struct purchases *b,
     return best;
 }
 
-static double cost_of(const struct submitted_images *h, const struct rubric_image *p, int image,
-                      int spp)
+static double cost_of(const struct longest *run, const struct rubric_image *p, int spp)
 {
-    return fmax(0.02, h->made[image].cpu_s) * (rubric_is_adaptive(p) ? 1.5 : (double)spp / p->spp);
+    return fmax(0.02, run->cpu_s) * (rubric_is_adaptive(p) ? 1.5 : spp / run->spp);
 }
 
 /* Index of the image that adds most noise to an undecided check; -1: none has further runs. *more:
@@ -237,10 +238,10 @@ static int cheapest(const struct collect *c, struct submitted_images *h,
         if (image < 0)
             continue;
         int samples = next_samples(c, b, h, image, more);
-        double cost = cost_of(h, &r->image[image], image, samples);
+        double cost = cost_of(&b->longest[image], &r->image[image], samples);
         if (samples == 0) {
             b->stuck[image] = true;
-            tell_no_more(c, h, image);
+            tell_no_more(c, &b->longest[image], h, image);
         } else if (cost <= least) {
             least = cost;
             best = image;
@@ -385,6 +386,8 @@ static bool buy(const struct collect *c, struct submitted_images *h, int image, 
         return false;
     b->left_s -= made.cpu_s;
     h->bought_s += made.cpu_s;
+    if (spp > b->longest[image].spp)
+        b->longest[image] = (struct longest){spp, made.cpu_s, made.wall_s};
     if (more.mean == NULL) {
         b->stuck[image] = true;
         snprintf(h->no_more[image], sizeof *h->no_more,
@@ -406,8 +409,10 @@ bool collect_until_decided(const struct collect *c, struct submitted_images *h, 
     bool ok = b != NULL || err_set(e, "out of memory");
     if (ok)
         b->left_s = r->budget_s;
-    for (int i = 0; ok && i < r->num_images; i++)
+    for (int i = 0; ok && i < r->num_images; i++) {
         b->tried[i][b->num[i]++] = r->image[i].spp;
+        b->longest[i] = (struct longest){r->image[i].spp, h->made[i].cpu_s, h->made[i].wall_s};
+    }
     for (int image = 0, spp = 0; ok && image >= 0;) {
         ok = grade_all_checks(&g, out, set, e);
         image = ok ? cheapest(c, h, out, b, &spp) : -1;
