@@ -168,9 +168,11 @@ static void print_result(const struct compare_job *job, const struct compared *c
         printf("smallest detectable %s of the image, %s of a tile; p at most %.3g; %zu tests\n",
                image, tile, pow(10, c->flip.log10_p), c->flip.num_tests);
     else
-        printf("difference %+.3f %% [%+.3f, %+.3f], smallest detectable %s of the image, %s of a "
-               "tile; %d tests\n",
-               100 * g->difference, 100 * g->ci_lo, 100 * g->ci_hi, image, tile, r->num_tests);
+        printf("difference %+.3f %% [%+.3f, %+.3f] (%s%.6g %% interval), smallest detectable %s of "
+               "the image, %s of a tile; %d tests\n",
+               100 * g->difference, 100 * g->ci_lo, 100 * g->ci_hi,
+               g->ci_valid ? "" : "too skewed for a ", 100 - 200 * job->opt.alpha, image, tile,
+               r->num_tests);
     print_noise(&r->variance);
     if (r->extra_factor > 1) {
         verdict_more_samples(r->extra_factor, "samples", more);
