@@ -4,6 +4,7 @@
 #include <gsl/gsl_cdf.h>
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 static const double fewest_dof = 100; /* to know a variance to 14 % */
 static const double most_growth =
@@ -87,10 +88,43 @@ static struct square_noise measure(const struct level *l, int side)
     return s;
 }
 
+/* Measures groups of squares instead: those whose columns are equal modulo nx, and rows modulo ny. */
+static struct square_noise measure_folded(const struct level *l, int nx, int ny, int side,
+                                          double *sums)
+{
+    const size_t squares = (size_t)l->nx * (size_t)l->ny, groups = (size_t)nx * (size_t)ny;
+    const struct level f = {nx, ny, l->num, sums, sums + (size_t)l->num * groups};
+    memset(sums, 0, ((size_t)l->num + 1) * groups * sizeof *sums);
+    for (int y = 0; y < l->ny; y++)
+        for (int x = 0; x < l->nx; x++) {
+            const size_t from = (size_t)y * (size_t)l->nx + (size_t)x;
+            const size_t to = (size_t)(y % ny) * (size_t)nx + (size_t)(x % nx);
+            f.pixels[to] += l->pixels[from];
+            for (int k = 0; k < l->num; k++)
+                f.sum[(size_t)k * groups + to] += l->sum[(size_t)k * squares + from];
+        }
+    return measure(&f, side);
+}
+
+/* From squares of 2 x 2 pixels: rows, columns, and tiles of 8, 16, .. that may repeat. */
+static bool measure_groups(const struct level *l, struct shared_noise *out, struct err *e)
+{
+    double *sums = malloc(((size_t)l->num + 1) * (size_t)l->nx * (size_t)l->ny * sizeof *sums);
+    if (sums == NULL)
+        return err_set(e, "noise that pixels share: out of memory");
+    out->group[out->num_groups++] = measure_folded(l, 1, l->ny, 0, sums);
+    out->group[out->num_groups++] = measure_folded(l, l->nx, 1, 0, sums);
+    for (int n = 4; n < (l->nx > l->ny ? l->nx : l->ny); n *= 2)
+        out->group[out->num_groups++] =
+            measure_folded(l, n < l->nx ? n : l->nx, n < l->ny ? n : l->ny, 2 * n, sums);
+    free(sums);
+    return true;
+}
+
 bool shared_noise_measure(const struct replicates *r, struct shared_noise *out, struct err *e)
 {
     assert(r->num >= 3);
-    *out = (struct shared_noise){.num = 0};
+    *out = (struct shared_noise){.width = r->width, .height = r->height};
     struct level l = {.nx = (r->width + 1) / 2, .ny = (r->height + 1) / 2, .num = r->num};
     const size_t squares = (size_t)l.nx * (size_t)l.ny, k = (size_t)r->num;
     l.sum = calloc((k + 1) * squares + k, sizeof *l.sum);
@@ -98,6 +132,10 @@ bool shared_noise_measure(const struct replicates *r, struct shared_noise *out, 
         return err_set(e, "noise that pixels share: out of memory");
     l.pixels = l.sum + k * squares;
     sum_pixels(r, l.pixels + squares, &l);
+    if (!measure_groups(&l, out, e)) {
+        free(l.sum);
+        return false;
+    }
     for (int side = 2;; side *= 2) {
         out->square[out->num++] = measure(&l, side);
         if (l.nx == 1 && l.ny == 1)
@@ -108,13 +146,39 @@ bool shared_noise_measure(const struct replicates *r, struct shared_noise *out, 
     return true;
 }
 
-double shared_noise_factor(const struct shared_noise *s, double alpha,
-                           const struct square_noise **unlimited)
+/* The ratio plus three standard errors. */
+static double at_most(const struct square_noise *q)
 {
-    const double level = log10(alpha / (s->num > 0 ? s->num : 1));
+    return q->ratio * (1 + 3 * sqrt(2 / q->dof));
+}
+
+static bool exceeds(const struct square_noise *q, double ratio, double log10_p)
+{
+    return log10_tail(q->dof * q->ratio / ratio, q->dof) <= log10_p;
+}
+
+/* What rows, columns and tiles add to the ratio of squares of this side, if they share noise. */
+static double of_groups(const struct shared_noise *s, int side, double level)
+{
+    double lines = 1, tiles = 1;
+    for (int i = 0; i < s->num_groups; i++) {
+        const struct square_noise *g = &s->group[i];
+        if (!exceeds(g, 1, level))
+            continue;
+        if (i < 2)
+            lines += (at_most(g) - 1) * fmin(1, (double)side / (i == 0 ? s->width : s->height));
+        else if (side > g->side)
+            tiles = fmax(tiles, at_most(g));
+    }
+    return fmax(lines, tiles);
+}
+
+/* The factor by squares alone. */
+static double of_squares(const struct shared_noise *s, double level,
+                         const struct square_noise **unlimited)
+{
     const struct square_noise *shown = NULL, *largest = NULL;
     double before = 1;
-    *unlimited = NULL;
     for (const struct square_noise *q = s->square; q < s->square + s->num; q++) {
         if (q->log10_p <= level)
             shown = q;
@@ -125,13 +189,33 @@ double shared_noise_factor(const struct shared_noise *s, double alpha,
     }
     if (shown == NULL)
         return 1;
-    double limit = 2 * largest->ratio - before;
-    double factor = fmax(limit, largest->ratio) + 3 * largest->ratio * sqrt(2 / largest->dof);
+    const double limit = 2 * largest->ratio - before;
+    const double factor = fmax(limit, largest->ratio) + at_most(largest) - largest->ratio;
     if (limit > most_growth * largest->ratio)
         *unlimited = largest;
     /* What the largest squares would show if that were all; as sharing is shown, sqrt(alpha) is rare enough. */
     for (const struct square_noise *q = largest + 1; q < s->square + s->num; q++)
-        if (log10_tail(q->dof * q->ratio / factor, q->dof) <= level / 2)
+        if (exceeds(q, factor, level / 2))
             *unlimited = q;
+    return factor;
+}
+
+double shared_noise_factor(const struct shared_noise *s, double alpha,
+                           const struct square_noise **unlimited)
+{
+    const double level = log10(alpha / fmax(1, s->num + s->num_groups));
+    const double groups = of_groups(s, s->width > s->height ? s->width : s->height, level);
+    bool explained = groups > 1; /* squares show no more than groups add to them */
+    *unlimited = NULL;
+    for (int i = 0; i < s->num; i++) {
+        const struct square_noise *q = &s->square[i];
+        explained = explained && !exceeds(q, of_groups(s, q->side, level), level / 2);
+    }
+    if (explained)
+        return groups;
+    double factor = of_squares(s, level, unlimited);
+    for (int i = 0; i < s->num_groups; i++)
+        if (exceeds(&s->group[i], factor, level))
+            factor = fmax(factor, groups);
     return factor;
 }

@@ -10,7 +10,7 @@
 #include "replicates.h"
 
 enum { MOST_SQUARE_SIZES = 24 };
-/* Squares of one side that cut up the image. */
+/* Squares of one side that cut up the image, or groups of pixels. */
 struct square_noise {
     int side; /* 2, 4, 8, .. until one square is the image */
     double r, se; /* the mean correlation of two pixels in one square; its standard error if independent */
@@ -19,19 +19,24 @@ struct square_noise {
     double log10_p; /* of as large a ratio if pixels are independent: chi-square, about */
 };
 struct shared_noise {
-    int num;
+    int width, height, num;
     struct square_noise square[MOST_SQUARE_SIZES];
+    /* Of pairs of rows and of columns, side 0 (noise drawn once for a line), then of pixels (2 x 2) at the same place in
+     * tiles of side 8, 16, .. (a pattern that repeats: a mask, or buckets that start with the same seed). */
+    int num_groups;
+    struct square_noise group[MOST_SQUARE_SIZES + 2];
 };
 
 /* At least 3 replicates. False only out of memory. */
 NODISCARD bool shared_noise_measure(const struct replicates *r, struct shared_noise *out,
                                     struct err *e);
 
-/* By how much the variance of large sums exceeds that of independent pixels; 1 unless a size of squares shows more
- * with a p of at most alpha over their number. It is extrapolated from the largest squares of which there are enough (a
+/* By how much the variance of large sums exceeds that of independent pixels; 1 unless squares of a size, or a group, show
+ * more with a p of at most alpha over their number. It is extrapolated from the largest squares of which there are enough (a
  * fixed reach leaves out a part of the sum that falls as 1/side), plus three standard errors of their ratio.
  * *unlimited: NULL or, where no such factor is known, the size of squares that shows it: there the ratio still grows
- * too fast, or the largest squares exceed it. The whole image shares noise then, or there are too few pixels. */
+ * too fast, or the largest squares exceed it. The whole image shares noise then, or there are too few pixels. Where
+ * rows, columns or tiles explain what squares show, the factor is theirs. */
 double shared_noise_factor(const struct shared_noise *s, double alpha,
                            const struct square_noise **unlimited);
 

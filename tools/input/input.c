@@ -1,5 +1,6 @@
 #include "input_internal.h"
 
+#include "reference/replicates/independence.h"
 #include "tools/compare/region.h"
 #include "tools/images/replicate_dir.h"
 #include "tools/stats/noise_estimate.h"
@@ -13,10 +14,38 @@
 static const double most_censored = 0.05;     /* of the image, for EQUIVALENT */
 static const double most_censored_tile = 0.5; /* of a reporting tile */
 static const double sharing_alpha = 1e-6;     /* of "pixels share noise" where they do not */
+static const double least_correlation = 0.1;  /* of two renders that share noise */
 enum { most_measured = 64 };                  /* renders that this is measured on */
 
+/* Refuses renders that share noise with each other: a seed used twice on two machines, a render that goes on from the one before.
+ * Renders of unequal noise, as of equal times, are correlated a little without that. */
+static bool check_pairs(const char *path, const struct replicate_dir *from,
+                        const struct replicates *r, struct err *e)
+{
+    struct independence t;
+    if (!independence_test(r, sharing_alpha, &t, e))
+        return false;
+    const bool next = t.neighbours_z > t.limit && t.neighbours_r > least_correlation - 1.0 / r->num;
+    const bool pair = t.pair_z > t.pair_limit && t.pair_r > least_correlation - 1.0 / r->num;
+    if (!t.tested || (!next && !pair))
+        return true;
+    char number[2][16];
+    const char *name[2];
+    for (int i = 0; i < 2; i++) {
+        snprintf(number[i], sizeof number[i], "%d", t.pair[i] + 1);
+        name[i] =
+            from->name != NULL && from->name[t.pair[i]] != NULL ? from->name[t.pair[i]] : number[i];
+    }
+    return err_set(e,
+                   "%s: renders %s and %s share noise (correlation %.2g): the same seed, or some "
+                   "of the same samples? Each render needs a seed of its own",
+                   path, pair ? name[0] : "one", pair ? name[1] : "the next",
+                   pair ? t.pair_r : t.neighbours_r);
+}
+
 /* Fills sharing and unlimited from the renders. */
-static bool measure_sharing(const struct replicate_dir *from, struct input *out, struct err *e)
+static bool measure_sharing(const char *path, const struct replicate_dir *from, struct input *out,
+                            struct err *e)
 {
     struct replicates r;
     struct shared_noise s;
@@ -27,13 +56,15 @@ static bool measure_sharing(const struct replicate_dir *from, struct input *out,
     for (int k = 0; k < num; k++)
         replicates_add(&r, from->rgb[k]);
     bool ok = shared_noise_measure(&r, &s, e);
+    if (ok) {
+        r.sharing = out->sharing = shared_noise_factor(&s, sharing_alpha, &unlimited);
+        if (unlimited != NULL)
+            out->unlimited = *unlimited;
+        else
+            ok = check_pairs(path, from, &r, e);
+    }
     replicates_free(&r);
-    if (!ok)
-        return false;
-    out->sharing = shared_noise_factor(&s, sharing_alpha, &unlimited);
-    if (unlimited != NULL)
-        out->unlimited = *unlimited;
-    return true;
+    return ok;
 }
 
 /* spp: paths per pixel of each; 0: as they say themselves. */
@@ -46,7 +77,7 @@ static bool take_replicates(const char *path, char side, const struct replicate_
     if (spp > 0 && r->spp > 0)
         return err_set(e, "%s: --spp-%c: its renders say themselves how many samples they have",
                        path, side);
-    if (!measure_sharing(r, out, e) || !replicate_dir_moments(r, &out->m, e))
+    if (!measure_sharing(path, r, out, e) || !replicate_dir_moments(r, &out->m, e))
         return false;
     if (spp > 0)
         out->m.spp = spp;
@@ -223,7 +254,7 @@ static bool pair_images(struct input *a, struct input *b, struct notes *notes, s
                "pixel or two counts as noise and is missed");
     input_notes_add(
         notes,
-        "neighbouring pixels share noise: means of squares have %.2f, %.2f, %.2f times the variance "
+        "pixels share noise: means of squares, or of lines, have %.2f, %.2f, %.2f times the variance "
         "(R, G, B) that independent pixels of the same second differences have; this is allowed for",
         s.factor[0], s.factor[1], s.factor[2]);
     input_notes_add(
@@ -264,8 +295,8 @@ static bool allow_for_sharing(struct input *in, char side, struct notes *notes, 
     in->m.sharing = f;
     input_notes_add(
         notes,
-        "%c: pixels of a render share noise, as by a pixel filter: sums of many vary %.2g times as much as "
-        "independent pixels would. This is allowed for",
+        "%c: pixels of a render share noise, as by a pixel filter or in a pattern that repeats: sums of many vary "
+        "%.2g times as much as independent pixels would. This is allowed for",
         side, f);
     return true;
 }

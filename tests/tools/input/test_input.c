@@ -109,8 +109,9 @@ TEST(renders_state_their_paths)
                    "--spp-a: its renders say themselves");
 }
 
+enum { ROWS = 0, TILES = -8 };
 /* `count` renders of 32 x 32 pixels, each the mean of `side` x `side` normal draws of mean 1 that it shares with its
- * neighbours. */
+ * neighbours; ROWS: one of its own, and half of one of its row; TILES: one that every eighth pixel has, too. */
 static struct replicate_dir shared_renders(int count, int side, uint64_t *seed)
 {
     enum { SIDE = 32, MOST = 16 };
@@ -123,10 +124,16 @@ static struct replicate_dir shared_renders(int count, int side, uint64_t *seed)
             fine[i / (SIDE + MOST)][i % (SIDE + MOST)] = 1 + 0.3 * draw_normal(uniform(seed), seed);
         r.rgb[k] = calloc(3 * SIDE * SIDE, sizeof **r.rgb);
         for (int p = 0; p < SIDE * SIDE; p++)
-            for (int i = 0; i < side * side; i++)
-                for (int c = 0; c < 3; c++)
-                    r.rgb[k][3 * p + c] +=
+            for (int c = 0; c < 3; c++) {
+                float *value = &r.rgb[k][3 * p + c];
+                for (int i = 0; i < side * side && side > 0; i++)
+                    *value +=
                         (float)(fine[p / SIDE + i / side][p % SIDE + i % side] / (side * side));
+                if (side == ROWS)
+                    *value = (float)(fine[p / SIDE][p % SIDE] + fine[p / SIDE][SIDE] / 2);
+                else if (side == TILES)
+                    *value = (float)fine[p / SIDE % 8][p % SIDE % 8];
+            }
     }
     return r;
 }
@@ -152,7 +159,7 @@ static bool compare_shared(int side, bool naive, uint64_t *seed, enum verdict *v
     bool ok = input_pair(&in[0], &in[1], &notes, why) &&
               compare_moments(&in[0].m, &in[1].m, &opt, &c, why);
     if (ok) {
-        assert_int_equal(has_note(&notes, "share noise, as by a pixel filter"), !naive);
+        assert_int_equal(has_note(&notes, "share noise, as by a pixel filter or"), !naive);
         /* What takes neighbours for independent is left out. */
         assert_int_equal(c.statistic[STATISTIC_MATCHED_FILTER].share > 0, naive);
         assert_int_equal(c.variance.valid, naive);
@@ -164,26 +171,56 @@ static bool compare_shared(int side, bool naive, uint64_t *seed, enum verdict *v
     return ok;
 }
 
-/* H0: two folders of 8 equal renders under a box filter of two pixels, alpha 5 %: at most Binomial(60, 5 %) are
- * DIFFERENT, more than 10 with a probability of 2e-4. Control: with pixels taken for independent, sums have half their
- * standard error, and more than half of 20 pairs are. Renders smoothed over a quarter of the image are refused. */
+/* H0: two folders of 8 equal renders under a box filter of two pixels, or whose noise rows or tiles share, alpha 5 %: at most
+ * Binomial(60, 5 %) are DIFFERENT, more than 10 with a probability of 2e-4. Control: with pixels taken for independent, sums
+ * have at most half their standard error, and more than half of 20 pairs are. Renders smoothed over a quarter of the
+ * image are refused. */
 TEST(replicates_that_share_noise)
 {
+    static const int kinds[] = {2, ROWS, TILES};
     uint64_t seed = 41;
     struct err e;
-    int different[2] = {0};
-    for (int naive = 0; naive < 2; naive++)
-        for (int i = 0; i < (naive ? 20 : 60); i++) {
-            enum verdict v = VERDICT_INCONCLUSIVE;
-            MUST(compare_shared(2, naive, &seed, &v, &e));
-            different[naive] += v == VERDICT_DIFFERENT;
-        }
-    printf("shared noise: DIFFERENT in %d of 60, and in %d of 20 as if independent\n", different[0],
-           different[1]);
-    assert_in_range(different[0], 0, 10);
-    assert_in_range(different[1], 11, 20);
+    for (size_t kind = 0; kind < sizeof kinds / sizeof *kinds; kind++) {
+        int different[2] = {0};
+        for (int naive = 0; naive < 2; naive++)
+            for (int i = 0; i < (naive ? 20 : 60); i++) {
+                enum verdict v = VERDICT_INCONCLUSIVE;
+                MUST(compare_shared(kinds[kind], naive, &seed, &v, &e));
+                different[naive] += v == VERDICT_DIFFERENT;
+            }
+        printf("shared noise %d: DIFFERENT in %d of 60, and in %d of 20 as if independent\n",
+               kinds[kind], different[0], different[1]);
+        assert_in_range(different[0], 0, 10);
+        assert_in_range(different[1], 11, 20);
+    }
     enum verdict v = VERDICT_INCONCLUSIVE;
     REFUSES(compare_shared(16, false, &seed, &v, &e), "--exchangeable compares whole images");
+}
+
+/* A render that is nearly another one, or that holds half of its samples, is refused; so is a folder in which each goes on
+ * from the one before. (Folders of independent renders are taken: the test before.) */
+TEST(replicates_that_share_samples)
+{
+    enum { COUNT = 8, VALUES = 3 * 32 * 32 };
+    static const struct {
+        double share;
+        bool all;
+    } cases[] = {{0.999999, false}, {0.5, false}, {0.5, true}};
+    uint64_t seed = 43;
+    struct notes notes = {0};
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        struct replicate_dir r = shared_renders(COUNT, 1, &seed);
+        for (int j = cases[k].all ? 1 : 5; j < (cases[k].all ? COUNT : 6); j++)
+            for (int i = 0; i < VALUES; i++)
+                r.rgb[j][i] =
+                    (float)(cases[k].share * r.rgb[j - 1][i] + (1 - cases[k].share) * r.rgb[j][i]);
+        const struct input_memory memory = {.renders = r, .type = IMAGE_FLOAT};
+        struct input in;
+        struct err e;
+        REFUSES(input_take(&memory, "renders", 'a', &(struct input_options){0}, &in, &notes, &e),
+                cases[k].all ? "share noise" : "renders 5 and 6 share noise (correlation");
+        replicate_dir_free(&r);
+    }
 }
 
 /* 1 x 1 pixel, n = 100. X: E[x] = 2, E[x^2] = 5: variance 1 of one sample with n below, M2 = 100.
