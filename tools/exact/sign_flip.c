@@ -235,7 +235,10 @@ bool sign_flip_test(const struct sign_flip_images *in, const struct sign_flip_op
             for (int i = 0; i < scan.num_sizes; i++)
                 scan_size(&s, &scan, &scan.size[i], score, channel);
             if (score == SIGN_FLIP_LEVEL && channel == CHANNEL_LUMINANCE) {
-                out->shares_noise = opt->filter_width == 0 && sheet_shares_noise(&s);
+                if (opt->filter_width == 0 && !sheet_shares_noise(&s, &out->shares_noise, e)) {
+                    sheet_free(&s);
+                    return false;
+                }
                 fill_mdb(&s, &scan, out);
             }
         }

@@ -1,9 +1,14 @@
 #include "sign_flip_score.h"
 
+#include "tools/stats/line_noise.h"
+
+#include <gsl/gsl_cdf.h>
 #include <math.h>
 #include <stdlib.h>
 
 enum { RADIUS = 4, BLOCK = 8 }; /* pixels: RADIUS of local means; BLOCK of sheet_shares_noise() */
+enum { FEWEST_LINES = 16 };
+static const double lines_alpha = 1e-6; /* of "lines share noise" where they do not */
 /* Standard deviation of a normal law over the geometric mean of |x|: e^((ln 2 + gamma)/2). */
 static const double of_geometric_mean = 1.8874;
 const double sheet_lost_digits = 1e-10;
@@ -205,7 +210,7 @@ static bool block_products(const struct sheet *s, const double *score, int x, in
     return true;
 }
 
-bool sheet_shares_noise(const struct sheet *s)
+static bool neighbours_share_noise(const struct sheet *s)
 {
     double all = 0, variance = 0, sum, squares;
     int blocks = 0, positive = 0;
@@ -221,6 +226,43 @@ bool sheet_shares_noise(const struct sheet *s)
                 variance += squares;
             }
     return positive > 0.8 * blocks && all > 5 * sqrt(variance);
+}
+
+/* Of the rows or columns of all pairs; `lines` has room for three numbers a line. */
+static bool lines_share_noise(const struct sheet *s, bool columns, double *lines)
+{
+    const int num = columns ? s->width : s->height, length = columns ? s->height : s->width;
+    const size_t step = columns ? (size_t)s->width : 1, next = columns ? 1 : (size_t)s->width;
+    double *square = lines + 2 * num;
+    size_t squares = 0;
+    for (int k = 0; k < s->num; k++) {
+        double *sum = lines, *variance = lines + num;
+        for (int i = 0; i < num; i++) {
+            const double *score = s->score + (size_t)k * s->pixels + (size_t)i * next;
+            sum[i] = variance[i] = 0;
+            for (int j = 0; j < length; j++, score += step) {
+                sum[i] += *score;
+                variance[i] += *score * *score;
+            }
+        }
+        squares += line_noise_squares(sum, variance, (size_t)num, square + squares);
+    }
+    if (squares < FEWEST_LINES)
+        return false;
+    double dof, ratio = line_noise_ratio(square, squares, &dof);
+    return gsl_cdf_chisq_Q(dof * ratio, dof) < lines_alpha;
+}
+
+bool sheet_shares_noise(const struct sheet *s, bool *shares, struct err *e)
+{
+    const int longest = s->width > s->height ? s->width : s->height;
+    double *lines = malloc(((size_t)s->num + 2) * (size_t)longest * sizeof *lines);
+    if (lines == NULL)
+        return err_set(e, "out of memory for %d lines", longest);
+    *shares = neighbours_share_noise(s) || lines_share_noise(s, false, lines) ||
+              lines_share_noise(s, true, lines);
+    free(lines);
+    return true;
 }
 
 double sheet_sum(const struct sheet *s, int which, struct rect r)

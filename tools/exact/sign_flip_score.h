@@ -31,10 +31,11 @@ void sheet_score(struct sheet *s, enum sign_flip_score score);
  * its signs. The level must have been scored before. */
 void sheet_expect(struct sheet *s, double change);
 
-/* Do neighbours look as if they shared noise? Sums products of adjacent scores, minus the block's mean, in blocks of 8
- * x 8 pixels of which at least a fifth has the other sign, so that there is noise and not only a difference: with
- * independent noise half of the blocks' sums are positive, with a filter nearly all. */
-bool sheet_shares_noise(const struct sheet *s);
+/* Do neighbours, or the pixels of a row or column (line_noise.h), look as if they shared noise? Of neighbours it sums
+ * products of adjacent scores, minus the block's mean, in blocks of 8 x 8 pixels of which at least a fifth has the other
+ * sign, so that there is noise and not only a difference: with independent noise half of the blocks' sums are positive,
+ * with a filter nearly all. Fails only out of memory. */
+NODISCARD bool sheet_shares_noise(const struct sheet *s, bool *shares, struct err *e);
 
 /* Sum over r of the scores (which = 0) or their squares (1). */
 double sheet_sum(const struct sheet *s, int which, struct rect r);

@@ -1,5 +1,7 @@
 #include "noise_estimate.h"
 
+#include "line_noise.h"
+
 #include <gsl/gsl_cdf.h>
 #include <gsl/gsl_sort.h>
 #include <math.h>
@@ -221,6 +223,37 @@ static bool coarse(const struct grid *d, const struct blocks *g, int side, doubl
     return ok;
 }
 
+/* An upper bound of the variance of sums over rows (or columns) over that of independent pixels of variance v; 1 unless
+ * that is shown to be more than `factor`. */
+static bool lines(const struct grid *d, bool columns, double v, double factor, double *bound,
+                  struct err *e)
+{
+    const int num = columns ? d->width : d->height, length = columns ? d->height : d->width;
+    double *sum = malloc(3 * (size_t)num * sizeof *sum);
+    *bound = 1;
+    if (sum == NULL)
+        return err_set(e, "out of memory for %d lines", num);
+    double *variance = sum + num, *square = variance + num;
+    for (int i = 0; i < num; i++) {
+        sum[i] = variance[i] = 0;
+        for (int k = 0; k < length; k++) {
+            const double z = columns ? at(d, i, k) : at(d, k, i);
+            if (!isnan(z)) {
+                sum[i] += z;
+                variance[i] += v;
+            }
+        }
+    }
+    const size_t squares = line_noise_squares(sum, variance, (size_t)num, square);
+    if (squares >= FEWEST) {
+        double dof, ratio = line_noise_ratio(square, squares, &dof);
+        if (gsl_cdf_chisq_Q(dof * ratio / factor, dof) < level_error)
+            *bound = ratio * dof / gsl_cdf_chisq_Pinv(level_error, dof);
+    }
+    free(sum);
+    return true;
+}
+
 static bool tell_too_few(struct err *e)
 {
     return err_set(e, "too few pixels vary or are not saturated to tell their noise");
@@ -264,10 +297,15 @@ static bool level(const struct grid *d, const struct blocks *blocks, double *fac
             dof = more;
             shared = *factor > steep * half;
         }
-        double q = fmin(*factor / half, unbounded);
+        double q = fmin(*factor / half, unbounded), rows = 1, columns = 1;
+        const double v = f.s2 / f.num, known = fmax(1, *factor);
+        ok = ok && lines(&fine, false, v, known, &rows, e) &&
+             lines(&fine, true, v, known, &columns, e);
         if (ok)
             *bound = *factor * dof / gsl_cdf_chisq_Pinv(level_error, dof) +
                      fmax(0, *factor - half) * fmax(1, q / (4 - q));
+        *bound = fmax(*bound, rows + columns - 1);
+        *factor = fmax(*factor, rows + columns - 1);
     }
     free(fine.v);
     free(twos.v);

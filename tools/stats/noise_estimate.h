@@ -12,6 +12,8 @@
  * the side are used while it rises steeply (up to 16 for a filter of 7 pixels), by medians of squared
  * differences of neighbouring squares, which are robust against a region in which the images differ.
  *
+ * Where sums over rows or columns (line_noise.h) vary by more than that, they set the factor.
+ *
  * Degrees of freedom: Var(sum r^2) is at most 4 sum r^4, for normal noise (2.52: neighbouring r are
  * correlated) and for the heaviest tails alike; an image of N pixels of normal noise has N/6.
  * Skewness of D: 6 sum r^3 (the kernel cubed sums to 1/6), one coefficient for the image, with its

@@ -124,8 +124,8 @@ void same_program_decide(const struct sign_flip *f, double alpha, struct compari
     if (f->shares_noise) {
         r->verdict = VERDICT_INCONCLUSIVE;
         snprintf(r->reason, size,
-                 "neighbouring pixels look as if they shared noise: --filter-width N says how wide "
-                 "the filter is, in pixels (1: they share none)");
+                 "pixels look as if they shared noise with their neighbours or their line: "
+                 "--filter-width N says how wide a filter is, in pixels (1: they share none)");
     } else if (f->log10_p <= log10(alpha)) {
         const char *more = f->t > 0 ? "brighter" : "darker",
                    *noise = f->t > 0 ? "noisier" : "less noisy";

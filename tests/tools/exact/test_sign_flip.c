@@ -193,17 +193,31 @@ static void smooth(float *pixel)
     memcpy(pixel, out, sizeof out);
 }
 
+/* Adds to each row a normal number of standard deviation `sd`. */
+static void shake_rows(float *pixel, double sd, uint64_t *seed)
+{
+    double shift = 0;
+    for (int i = 0; i < VALUES; i++) {
+        if (i % (3 * SIDE) == 0)
+            shift = sd * draw_normal(uniform(seed), seed);
+        pixel[i] += (float)shift;
+    }
+}
+
 /* Filtered pixels share noise. Judged as independent, equal laws are DIFFERENT in most pairs (the control); with one
- * pixel of each 3 x 3 the level holds. The shared noise is detected where no filter was declared, and not detected
- * in unfiltered images, with or without a difference. */
+ * pixel of each 3 x 3 the level holds. The shared noise is detected where no filter was declared, as is that of rows with
+ * the standard deviation of a pixel's own, and not detected in unfiltered images, with or without a difference. */
 TEST(test_filtered_pixels)
 {
     uint64_t seed = 31;
-    int wrong = 0, rejected = 0, seen = 0;
+    int wrong = 0, rejected = 0, seen = 0, rows = 0;
     for (int i = 0; i < 100; i++) {
         struct pair p;
         draw_pair(&p, LAW_EXPONENTIAL, 4, 4, i % 4 * 0.1, everywhere, &seed);
         assert_false(flip_pair(&p, 0.05, 0).shares_noise);
+        shake_rows(p.a, 0.5, &seed);
+        shake_rows(p.b, 0.5, &seed);
+        rows += flip_pair(&p, 0.05, 0).shares_noise;
         draw_pair(&p, LAW_EXPONENTIAL, 4, 4, 0, everywhere, &seed);
         smooth(p.a);
         smooth(p.b);
@@ -213,6 +227,7 @@ TEST(test_filtered_pixels)
     }
     assert_true(lower_bound(wrong, 100) > 0.3);
     assert_int_equal(seen, 100);
+    assert_true(rows >= 95);
     assert_true(lower_bound(rejected, 100) <= 0.05);
 }
 
