@@ -49,7 +49,21 @@ check "eve has her own" bash -c "! grep -q eve '$tmp/alike'"
 tr -d '\n' <"$tmp/two/index.html" | sed -n 's/.*<h2>The noise of the reference//p' | sed 's,</ul>.*,,' >"$tmp/copied"
 check "mal has the reference's noise" grep -q '>mal</a>: cornell' "$tmp/copied"
 check "nobody else has" test "$(grep -o '<li>' "$tmp/copied" | wc -l)" -eq 1
-check "where no mistakes are known nobody says that none was found" grep -q 'What is wrong shows <b>' "$tmp/two/bob/index.html"
+check "where no mistakes are known nobody says that none was found" grep -q 'What is wrong shows <b>' "$tmp/two/bob/staff.html"
+# What bob lost, a check says that is shown after the due date: until then his page does not. Shown (control), it does.
+reads() { cat "$tmp/$1/bob/index.html" "$tmp/$1/bob/results.json" | python3 -c '
+import json, re, sys
+page, results = sys.stdin.read().split("</html>")
+results = json.loads(results)
+print(page, results["output"], [t["output"] for t in results["tests"] if t["visibility"] == "visible"])'; }
+sed '/^ *visibility/d' "$rubric" >"$tmp/shown.rubric"
+"$build/assay" grade -q -o "$tmp/shown" --before "$tmp/two" "$tmp/shown.rubric" "$tmp/submissions/bob" >"$tmp/out" 2>&1
+for what_is_lost in 'bounced off two surfaces' 'cornell'; do
+    check "a hidden check's conclusion: '$what_is_lost' is for staff" grep -q "$what_is_lost" "$tmp/two/bob/staff.html"
+    tell "not for bob" "$(reads two 2>&1 | grep -o ".\{40\}$what_is_lost.*\|Traceback")"
+    tell "but if the check is shown" "$(reads shown 2>&1 | grep -q "$what_is_lost" || echo "it is not")"
+done
+check "nor are its points" bash -c "grep -q 'bob: 4.00 of 4 points' '$tmp/two/bob/index.html' && grep -q 'bob: 4.00 of 10 points' '$tmp/shown/bob/index.html'"
 # The command on the page of staff, as a shell reads it, from where the class was graded.
 (cd "$tmp" && "$build/assay" grade -q -o "the class's" "$OLDPWD/$rubric" submissions/ada >/dev/null 2>&1)
 printed=$(python3 -c 'import html, re, sys

@@ -4,6 +4,7 @@
 #include "carried_ratio.h"
 
 #include <stdio.h>
+#include <stdlib.h>
 
 /* Grades the checks that lost points again, with the deviations of `set`, and keeps what is better:
  * a bug can spoil every image that shows the deviations, so that they were not recognised before. */
@@ -52,38 +53,89 @@ static bool diagnose_parts(const struct grading *g, int set, const double *share
     return true;
 }
 
-bool mistake_judge(const struct grading *g, int *set, struct result *result, struct mistake *out,
-                   struct err *e)
+/* Names the mistake, or says where it shows; costs nobody a point. */
+static bool find(const struct grading *g, int set, const double *share, struct mistake *out,
+                 struct err *e)
 {
-    double share[RUBRIC_CHECKS];
-    bool paid[RUBRIC_PARTS] = {false};
     struct err why;
-    *out =
-        (struct mistake){.judged = true, .looked = is_seen(g), .with = *set, .located.image = -1};
-    for (int i = 0; i < g->r->num_checks; i++)
-        share[i] = result[i].share;
-    if (out->looked && !rubric_bugs_diagnose(g, *set, NULL, &out->found, &out->with, &why)) {
+    *out = (struct mistake){.judged = true, .looked = is_seen(g), .with = set, .located.image = -1};
+    if (out->looked && !rubric_bugs_diagnose(g, set, NULL, &out->found, &out->with, &why)) {
         if (err_is_of_memory(&why))
             return err_set(e, "%s", why.msg);
         out->looked = false;
         snprintf(out->why, sizeof out->why, "%.190s", why.msg);
     }
+    if (out->looked && out->found.num_named > 0)
+        return true;
+    /* The checks found something wrong: FINDING_CORRECT only means that no known bug is likelier than
+     * none. */
+    if (out->looked && out->found.finding == FINDING_CORRECT)
+        snprintf(out->found.gate, sizeof out->found.gate,
+                 "no known bug, nor two of them, explains the images");
+    out->found.finding = FINDING_UNKNOWN;
+    if (!diagnose_parts(g, set, share, out, e))
+        return false;
+    out->located = located_by(g, share);
+    return true;
+}
+
+bool mistake_judge(const struct grading *g, int *set, struct result *result, struct mistake *out,
+                   struct err *e)
+{
+    double share[RUBRIC_CHECKS];
+    bool paid[RUBRIC_PARTS] = {false};
+    for (int i = 0; i < g->r->num_checks; i++)
+        share[i] = result[i].share;
+    if (!find(g, *set, share, out, e))
+        return false;
     if (out->looked && out->found.num_named > 0) {
         if (out->with != *set && !grade_with(g, out->with, result, e))
             return false;
         *set = out->with;
         if (!carried_by_name(g, out->with, &out->found, result, paid, e))
             return false;
-    } else {
-        /* The checks found something wrong: FINDING_CORRECT only means that no known bug is
-         * likelier than none. */
-        if (out->looked && out->found.finding == FINDING_CORRECT)
-            snprintf(out->found.gate, sizeof out->found.gate,
-                     "no known bug, nor two of them, explains the images");
-        out->found.finding = FINDING_UNKNOWN;
-        if (!diagnose_parts(g, *set, share, out, e))
-            return false;
-        out->located = located_by(g, share);
     }
     return carried_by_ratio(g, *set, share, paid, result, e);
+}
+
+/* What is left where only the checks that students may see are asked. */
+struct shown {
+    struct rubric rubric;
+    struct rubric_bugs bugs;
+    double share[RUBRIC_CHECKS];
+};
+
+/* Leaves out the other checks, and what is known of images that none of these looks at. Is anything lost? */
+static bool leave_shown(const struct grading *g, const double *share, struct shown *out)
+{
+    struct rubric *r = &out->rubric;
+    bool lost = false;
+    *r = *g->r;
+    r->num_checks = 0;
+    for (int i = 0; i < g->r->num_checks; i++)
+        if (rubric_is_shown(&g->r->check[i])) {
+            out->share[r->num_checks] = share[i];
+            r->check[r->num_checks++] = g->r->check[i];
+            lost = lost || share[i] < 1;
+        }
+    for (int i = 0; g->bugs != NULL && i < r->num_images; i++)
+        for (int k = 0; k < RUBRIC_SETS && !rubric_bugs_sees(r, i); k++)
+            out->bugs.view[k][i] = -1;
+    return lost;
+}
+
+bool mistake_shown(const struct grading *g, int set, const double *share, struct mistake *out,
+                   struct err *e)
+{
+    struct shown *shown = calloc(1, sizeof *shown);
+    *out = (struct mistake){.located.image = -1};
+    if (shown == NULL)
+        return err_set(e, "out of memory");
+    if (g->bugs != NULL)
+        shown->bugs = *g->bugs;
+    const struct grading only = {&shown->rubric, g->a, g->h, g->alpha,
+                                 g->bugs != NULL ? &shown->bugs : NULL};
+    bool ok = !leave_shown(g, share, shown) || find(&only, set, shown->share, out, e);
+    free(shown);
+    return ok;
 }

@@ -23,4 +23,10 @@ struct mistake {
 NODISCARD bool mistake_judge(const struct grading *g, int *set, struct result *result,
                              struct mistake *out, struct err *e);
 
+/* What of it follows from the checks that students may see now (rubric_is_shown()) and their images alone, as the
+ * name of a mistake also tells what the other checks found. share: of all checks, against right images with the
+ * deviations of `set`. Nothing is `judged` where the checks that are shown lost nothing. Fails as above. */
+NODISCARD bool mistake_shown(const struct grading *g, int set, const double *share,
+                             struct mistake *out, struct err *e);
+
 #endif

@@ -134,23 +134,35 @@ static void tell_failed(const struct rubric *r, const struct submitted_images *h
     }
 }
 
+/* What was done wrong: what all checks say of it, and what those do that students may see. */
+struct conclusion {
+    struct mistake all, shown;
+    bool hides; /* are there others? */
+};
+
 /* Looks for the mistake of a submission that lost points, unless a check is flagged: a copied image
  * shows no bug. */
 static bool find_mistake(const struct grade_job *job, struct submitted_images *h, int *set,
-                         struct result *result, struct mistake *out, struct err *e)
+                         struct result *result, struct conclusion *out, struct err *e)
 {
     const struct grading g = {job->rubric, job->answers, h, job->s->alpha, job->bugs};
+    double share[RUBRIC_CHECKS];
+    const int first = *set;
     bool lost = false, flagged = false;
+    *out = (struct conclusion){.all.located.image = -1, .shown.located.image = -1};
     for (int i = 0; i < job->rubric->num_checks; i++) {
-        lost |= result[i].share < 1;
+        share[i] = result[i].share;
+        lost |= share[i] < 1;
         flagged |= result[i].flag[0] != '\0';
+        out->hides |= !rubric_is_shown(&job->rubric->check[i]);
     }
-    *out = (struct mistake){.located.image = -1};
-    return !lost || flagged || mistake_judge(&g, set, result, out, e);
+    return !lost || flagged ||
+           (mistake_judge(&g, set, result, &out->all, e) &&
+            (!out->hides || mistake_shown(&g, first, share, &out->shown, e)));
 }
 
 static bool add_checks(const struct collect *c, struct submitted_images *h, json_t *grade,
-                       struct mistake *mistake, struct err *e)
+                       struct conclusion *mistake, struct err *e)
 {
     int set = 0;
     bool provisional = false;
@@ -189,11 +201,24 @@ static bool add_checks(const struct collect *c, struct submitted_images *h, json
     return ok;
 }
 
+/* Adds "diagnosis", "located" and "located_picture". */
+static void add_mistake(const struct grade_job *job, const struct mistake *m, json_t *to)
+{
+    json_object_set_new(to, "diagnosis",
+                        m->judged ? grade_diagnose_by_images(job->bugs, job->rubric, m)
+                                  : json_null());
+    if (m->located.text[0] == '\0')
+        return;
+    json_object_set_new(to, "located", json_string(m->located.text));
+    json_object_set_new(to, "located_picture",
+                        json_string(job->rubric->image[m->located.image].name));
+}
+
 static bool grade_made(const struct grade_job *job, struct submission *s, const char *work,
                        const char *out, json_t *grade, struct err *e)
 {
     struct submitted_images *h = calloc(1, sizeof *h);
-    struct mistake mistake;
+    struct conclusion mistake = {0};
     bool ok = h != NULL || err_set(e, "out of memory");
     const struct collect c = {job, s, work, out};
     ok = ok && collect_images(&c, h, e);
@@ -205,14 +230,12 @@ static bool grade_made(const struct grade_job *job, struct submission *s, const 
             json_string("images were handed in, and no program that makes them: nobody knows whose "
                         "they are ('allow images' in the rubric, if they are what it asks for)"));
     ok = ok && add_checks(&c, h, grade, &mistake, e);
-    json_object_set_new(grade, "diagnosis",
-                        ok && mistake.judged
-                            ? grade_diagnose_by_images(job->bugs, job->rubric, &mistake)
-                            : json_null());
-    if (ok && mistake.located.text[0] != '\0') {
-        json_object_set_new(grade, "located", json_string(mistake.located.text));
-        json_object_set_new(grade, "located_picture",
-                            json_string(job->rubric->image[mistake.located.image].name));
+    if (ok)
+        add_mistake(job, &mistake.all, grade);
+    if (ok && mistake.all.judged && mistake.hides) {
+        json_t *shown = json_object();
+        add_mistake(job, &mistake.shown, shown);
+        json_object_set_new(grade, "for_student", shown);
     }
     for (int i = 0; h != NULL && i < job->rubric->num_images; i++)
         submitted_image_free(&h->image[i]);

@@ -8,11 +8,6 @@
 
 #include <string.h>
 
-bool grade_summary_shows(const json_t *check, bool staff)
-{
-    return staff || strcmp(member_or_empty(check, "visibility"), "visible") == 0;
-}
-
 /* "Part 4 by itself looks like ...". */
 static void parts_by_themselves(FILE *f, const json_t *diagnosis)
 {
@@ -72,12 +67,11 @@ void grade_summary_bug(FILE *f, const json_t *grade)
 }
 
 /* The checks of a part that lost points, as links. */
-static void list_losses(FILE *f, const json_t *grade, bool staff, const char *part)
+static void list_losses(FILE *f, const json_t *grade, const char *part)
 {
     json_each(c, json_object_get(grade, "checks")) {
         double lost = member_number(c, "of") - member_number(c, "points");
-        if (strcmp(member_or_empty(c, "part"), part) == 0 && grade_summary_shows(c, staff) &&
-            lost >= 0.005)
+        if (strcmp(member_or_empty(c, "part"), part) == 0 && lost >= 0.005)
             html_print(
                 f,
                 "<span class=\"loss\"><span class=\"lost\">−%.2f</span> <a href=\"#check-%s\">%s</a></span>",
@@ -86,7 +80,7 @@ static void list_losses(FILE *f, const json_t *grade, bool staff, const char *pa
 }
 
 /* A bar for each part, as long as it is worth. */
-void grade_summary_parts(FILE *f, const json_t *grade, bool staff)
+void grade_summary_parts(FILE *f, const json_t *grade)
 {
     const json_t *parts = json_object_get(grade, "parts");
     double most = 1e-9;
@@ -107,7 +101,7 @@ void grade_summary_parts(FILE *f, const json_t *grade, bool staff)
                 "<span class=\"worth\" aria-hidden=\"true\" style=\"width:%.1f%%\">"
                 "<span style=\"width:%.1f%%\"></span></span>",
                 100 * of / most, of > 0 ? 100 * points / of : 100);
-        list_losses(f, grade, staff, member_or_empty(part, "number"));
+        list_losses(f, grade, member_or_empty(part, "number"));
         fprintf(f, "</th><td class=\"num\">%.2f of %g</td></tr>\n", points, of);
     }
     fputs("</tbody></table>\n", f);

@@ -7,6 +7,7 @@
 #include "reference/base/utc_date.h"
 #include "renderer/base/fs.h"
 #include "student_page.h"
+#include "student_view.h"
 #include "tools/base/text.h"
 #include "tools/html/html.h"
 #include "tools/results/results.h"
@@ -59,7 +60,8 @@ static void describe(const json_t *c, char *out, size_t size)
         text_append(out, size, "\nNot judged: staff have to look at this.");
 }
 
-/* What is said of the submission as a whole, the bug's name with its place above all. */
+/* What is said of the submission as a whole, which the student reads at once: the bug's name with its place above
+ * all. */
 static void describe_whole(const json_t *grade, char *out, size_t size)
 {
     const json_t *diagnosis = json_object_get(grade, "diagnosis");
@@ -108,12 +110,14 @@ static double execution_time(const json_t *grade)
  * score of the whole, which Gradescope adds up. */
 static json_t *gradescope(const json_t *grade)
 {
-    json_t *tests = json_array();
-    size_t i;
+    json_t *tests = json_array(), *view = student_view(grade);
+    size_t i, shown = 0;
     json_t *c;
     json_array_foreach(json_object_get(grade, "checks"), i, c) {
         char output[4096], name[400], number[32];
-        describe(c, output, sizeof output);
+        describe(student_view_shows(c) ? json_array_get(json_object_get(view, "checks"), shown++)
+                                       : c,
+                 output, sizeof output);
         snprintf(name, sizeof name, "Part %s: %s", member_or_empty(c, "part"),
                  member_or_empty(c, "title"));
         snprintf(number, sizeof number, "%s.%zu", member_or_empty(c, "part"), i + 1);
@@ -125,7 +129,8 @@ static json_t *gradescope(const json_t *grade)
                                                grade_is_full(c) ? "passed" : "failed"));
     }
     char whole[2048];
-    describe_whole(grade, whole, sizeof whole);
+    describe_whole(view, whole, sizeof whole);
+    json_decref(view);
     bool any = json_array_size(tests) > 0;
     json_t *root =
         json_pack("{so*, sf, ss, ss, ss, ss}", "output", json_string(whole), "execution_time",

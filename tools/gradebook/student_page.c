@@ -7,6 +7,7 @@
 #include "grade_needs.h"
 #include "renderer/base/fs.h"
 #include "renderer/base/shell_quote.h"
+#include "student_view.h"
 #include "tools/html/html.h"
 #include "tools/results/results.h"
 
@@ -16,10 +17,11 @@
 struct page {
     FILE *f;
     const char *dir;
-    const json_t *grade;
+    const json_t *grade; /* for a student what he may see of it (student_view.h) */
     bool staff;
     const struct rubric *rubric; /* on staff's pages; NULL: none */
     const struct answer_key *answers;
+    bool left_out; /* there are checks that are not shown */
 };
 
 static void paragraph(FILE *f, const char *label, const char *text, const char *class)
@@ -142,7 +144,7 @@ static bool show_checks(const struct page *p, bool out, struct err *e)
     size_t num = 0;
     bool ok = true;
     json_each(c, json_object_get(p->grade, "checks"))
-        num += grade_summary_shows(c, p->staff) && stands_out(p, c) == out;
+        num += stands_out(p, c) == out;
     if (num == 0)
         return true;
     if (out)
@@ -152,7 +154,7 @@ static bool show_checks(const struct page *p, bool out, struct err *e)
         fprintf(p->f, "<h2>What is right</h2><details><summary>%zu with all points</summary>\n",
                 num);
     json_each(c, json_object_get(p->grade, "checks"))
-        if (grade_summary_shows(c, p->staff) && stands_out(p, c) == out)
+        if (stands_out(p, c) == out)
             ok = ok && show_check(p, c, e);
     fputs(out ? "" : "</details>\n", p->f);
     return ok;
@@ -267,7 +269,6 @@ static bool show_facts(const struct page *p, struct err *e)
 
 static bool page(const struct page *p, struct err *e)
 {
-    bool left_out = false;
     html_page_open(p->f, member_or_empty(p->grade, "id"), NULL, 0);
     fputs("<div class=\"grade\">\n", p->f);
     show_head(p);
@@ -276,12 +277,10 @@ static bool page(const struct page *p, struct err *e)
         grade_summary_build_log(p->f, p->dir, p->grade);
     grade_summary_bug(p->f, p->grade);
     bool ok = show_image(p, member_or_empty(p->grade, "located_picture"), NULL, e);
-    grade_summary_parts(p->f, p->grade, p->staff);
+    grade_summary_parts(p->f, p->grade);
     ok = ok && show_checks(p, true, e) && show_checks(p, false, e);
-    json_each(c, json_object_get(p->grade, "checks"))
-        left_out |= !grade_summary_shows(c, p->staff);
-    if (left_out)
-        fputs("<p>Some checks are not shown yet.</p>\n", p->f);
+    if (p->left_out)
+        fputs("<p>Some checks are not shown yet: nothing on this page counts them.</p>\n", p->f);
     ok = ok && (!p->staff || show_facts(p, e));
     if (built)
         grade_summary_build_log(p->f, p->dir, p->grade);
@@ -292,11 +291,17 @@ static bool page(const struct page *p, struct err *e)
 
 bool student_page(FILE *f, const char *dir, const json_t *grade, struct err *e)
 {
-    return page(&(struct page){.f = f, .dir = dir, .grade = grade}, e);
+    json_t *view = student_view(grade);
+    const bool left_out = json_array_size(json_object_get(view, "checks")) <
+                          json_array_size(json_object_get(grade, "checks"));
+    bool ok = (view != NULL || err_set(e, "out of memory")) &&
+              page(&(struct page){.f = f, .dir = dir, .grade = view, .left_out = left_out}, e);
+    json_decref(view);
+    return ok;
 }
 
 bool student_page_for_staff(FILE *f, const char *dir, const struct rubric *r,
                             const struct answer_key *a, const json_t *grade, struct err *e)
 {
-    return page(&(struct page){f, dir, grade, true, r, a}, e);
+    return page(&(struct page){f, dir, grade, true, r, a, false}, e);
 }

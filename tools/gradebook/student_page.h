@@ -9,7 +9,8 @@
 #include <stdio.h>
 
 /* The student's page of one grade (grade_batch.h), whose images are in dir/ID: lost points first;
- * only visible checks, no references, nothing meant for staff. Fails only out of memory. */
+ * only visible checks and what follows from them (student_view.h), no references, nothing meant for staff. Fails only
+ * out of memory. */
 NODISCARD bool student_page(FILE *f, const char *dir, const json_t *grade, struct err *e);
 
 /* The same for staff: everything, beside the references if rubric and answers are given (NULL: they are not). */
@@ -17,16 +18,13 @@ NODISCARD bool student_page_for_staff(FILE *f, const char *dir, const struct rub
                                       const struct answer_key *a, const json_t *grade,
                                       struct err *e);
 
-/* Parts of a page (grade_summary.c). May a check be shown now? Staff see all. */
-bool grade_summary_shows(const json_t *check, bool staff);
-
-/* The named bug with its place in the assignment, or else where the mistake shows; nothing if
+/* Parts of a page (grade_summary.c). The named bug with its place in the assignment, or else where the mistake shows; nothing if
  * neither is known. */
 void grade_summary_bug(FILE *f, const json_t *grade);
 
 /* A bar for each part, its length in proportion to the points, and links (#check-NAME) to the
  * checks that lost some. */
-void grade_summary_parts(FILE *f, const json_t *grade, bool staff);
+void grade_summary_parts(FILE *f, const json_t *grade);
 
 /* The last 8 KiB of the build's log (grade's "build_log" in dir/ID), unfolded if the build failed;
  * nothing without a log. */

@@ -146,6 +146,9 @@ bool rubric_is_adaptive(const struct rubric_image *p);
 
 double rubric_points(const struct rubric *r);
 
+/* May students see the check before the due date? */
+bool rubric_is_shown(const struct rubric_check *c);
+
 /* The line of a statement among `lines`, or `otherwise` where it was not given. */
 int rubric_line_of(const struct rubric_line lines[RUBRIC_STATEMENTS], const char *word,
                    int otherwise);

@@ -69,6 +69,11 @@ double rubric_points(const struct rubric *r)
     return sum;
 }
 
+bool rubric_is_shown(const struct rubric_check *c)
+{
+    return strcmp(c->visibility, "visible") == 0;
+}
+
 struct path rubric_scene(const struct rubric *r, const struct rubric_image *p)
 {
     return p->suite != NULL ? fs_path("%s", p->suite->dae) : fs_path("%s/%s", r->dir, p->scene);

@@ -251,6 +251,41 @@ TEST(a_mistake_without_a_name_is_located)
     }
 }
 
+/* What is said of a bug while only the checks of the first `shown` parts may be seen. */
+static struct mistake told_of(const char *bug, int shown)
+{
+    static struct result result[RUBRIC_CHECKS];
+    struct submitted_images *h = bug_images_hand_in(&of, 0, bug_images_number(&of, bug), -1, 1);
+    const struct grading g = {of.rubric, of.answers, h, 1e-5, &of.bugs};
+    double share[RUBRIC_CHECKS];
+    struct mistake told;
+    struct err e;
+    int set;
+    MUST(grade_all_checks(&g, result, &set, &e));
+    for (int i = 0; i < of.rubric->num_checks; i++) {
+        struct rubric_check *c = &of.rubric->check[i];
+        share[i] = result[i].share;
+        snprintf(c->visibility, sizeof c->visibility, c->part < shown ? "visible" : "hidden");
+        result_free(&result[i]);
+    }
+    MUST(mistake_shown(&g, set, share, &told, &e));
+    for (int i = 0; i < of.rubric->num_checks; i++)
+        snprintf(of.rubric->check[i].visibility, sizeof of.rubric->check[i].visibility, "visible");
+    bug_images_take_back(&of, h);
+    return told;
+}
+
+/* Indirect light is Part 4's: who may see the checks of Parts 1 to 3 is told nothing of it. */
+TEST(a_mistake_that_only_hidden_checks_show_is_not_told)
+{
+    struct mistake all = told_of("indirect_albedo_squared", 5),
+                   early = told_of("indirect_albedo_squared", 3),
+                   direct = told_of("cosine_missing", 3);
+    assert_true(all.judged && all.found.num_named > 0);
+    assert_true(!early.judged && early.found.num_named == 0 && early.located.text[0] == '\0');
+    assert_true(direct.judged && direct.found.num_named > 0);
+}
+
 /* Hands in one grey level for all images (like -1), or image number `like` in the place of every other. */
 static struct submitted_images *hand_in_same(int like, uint8_t level)
 {

@@ -4,6 +4,7 @@
 
 #include "renderer/base/fs.h"
 #include "tools/gradebook/grade_batch.h"
+#include "tools/gradebook/student_view.h"
 #include "tests/support/own.h"
 #include "tests/support/test.h"
 
@@ -187,18 +188,64 @@ TEST(every_file_has_documented_fields_only)
                         "after_published");
     assert_string_equal(json_string_value(json_object_get(json_array_get(tests, 0), "status")),
                         "failed");
-    assert_non_null(strstr(json_string_value(json_object_get(root, "output")), "as\" 1/r"));
+    assert_string_equal(json_string_value(json_object_get(root, "output")), "");
     assert_true(json_number_value(json_object_get(root, "execution_time")) == 1.75);
     /* Some of the points; all of them, for now. */
     assert_non_null(strstr(output_of(root, 0), "Partial credit: 4.12 of 6 points."));
     assert_null(strstr(output_of(root, 0), "Provisional"));
     assert_null(strstr(output_of(root, 1), "Partial"));
     assert_non_null(strstr(output_of(root, 1), "Provisional: "));
-    assert_non_null(strstr(json_string_value(json_object_get(root, "output")), "provisional"));
     json_decref(root);
     root = results_of("cyd");
     assert_true(json_number_value(json_object_get(root, "score")) == 0);
     json_decref(root);
+}
+
+/* The grade with a mistake that only the second check shows, which is hidden or not; `shown`: what the first alone says of it. */
+static json_t *a_view(const char *visibility, json_t *shown)
+{
+    json_auto_t *grades = a_class();
+    json_t *grade = json_array_get(grades, 0), *checks = json_object_get(grade, "checks");
+    json_object_set_new(json_array_get(checks, 1), "visibility", json_string(visibility));
+    json_object_set_new(json_array_get(checks, 1), "share", json_real(0.5));
+    json_object_set_new(json_array_get(checks, 0), "carried", json_string("paid: falls as 1/r"));
+    json_object_set_new(grade, "for_student", shown);
+    json_object_set_new(grade, "located", json_string("only in glass"));
+    json_object_set_new(grade, "before", json_object());
+    return student_view(grade);
+}
+
+static json_t *first_of(const json_t *view, const char *array)
+{
+    return json_array_get(json_object_get(view, array), 0);
+}
+
+TEST(a_student_reads_what_the_shown_checks_say)
+{
+    json_t *hidden = a_view("hidden", json_pack("{sn}", "diagnosis"));
+    assert_int_equal(json_array_size(json_object_get(hidden, "checks")), 1);
+    assert_null(json_object_get(hidden, "located"));
+    assert_null(json_object_get(hidden, "before"));
+    assert_true(json_is_null(json_object_get(hidden, "diagnosis")));
+    assert_true(json_number_value(json_object_get(hidden, "of")) == 6);
+    assert_true(json_number_value(json_object_get(first_of(hidden, "parts"), "of")) == 6);
+    assert_null(
+        strstr(json_string_value(json_object_get(first_of(hidden, "checks"), "carried")), "1/r"));
+    json_decref(hidden);
+    json_t *all = a_view("visible", json_pack("{sn}", "diagnosis"));
+    assert_int_equal(json_array_size(json_object_get(all, "checks")), 2);
+    assert_string_equal(json_string_value(json_object_get(all, "located")), "only in glass");
+    assert_true(json_is_object(json_object_get(all, "diagnosis")));
+    assert_true(json_number_value(json_object_get(all, "of")) == 8);
+    assert_non_null(
+        strstr(json_string_value(json_object_get(first_of(all, "checks"), "carried")), "1/r"));
+    json_decref(all);
+    json_t *named = a_view("hidden", json_pack("{s{s[{ss}]}, ss}", "diagnosis", "named", "bug",
+                                               "falls as 1/r", "located", "only in rain"));
+    assert_string_equal(json_string_value(json_object_get(named, "located")), "only in rain");
+    assert_non_null(
+        strstr(json_string_value(json_object_get(first_of(named, "checks"), "carried")), "1/r"));
+    json_decref(named);
 }
 
 TEST(other_fields_and_values_are_rejected)
