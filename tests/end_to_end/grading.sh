@@ -115,6 +115,21 @@ seen deaf noisy "samples, and .*'box'" # the same with another number, or too sl
 check "without a sandbox an image may have the name of its directory" grep -q '"file": "box.png"' "$tmp/bare/right/grade.json"
 rm -r "$tmp/submissions" && mv "$tmp/class" "$tmp/submissions"
 
+# No image within the limit of wall time: of one that computed for a second of its six staff are told, as the machine may have been busy;
+# one that only waits does so on any machine (control).
+mkdir -p "$tmp/late/slow" "$tmp/late/idle"
+printf '#!/bin/sh\n(ulimit -t 1; while :; do :; done)\nsleep 100\n' >"$tmp/late/slow/pathtracer"
+printf '#!/bin/sh\nsleep 100\n' >"$tmp/late/idle/pathtracer"
+chmod +x "$tmp/late"/*/pathtracer
+sed 's/^limit wall.*/limit wall 6/; /^image cornell/,/^$/d; /^part 2/,$d; s/^total.*/total 4/' "$rubric" >"$tmp/late.rubric"
+"$build/assay" grade -q -j 2 -o "$tmp/lated" "$tmp/late.rubric" "$tmp/late/slow" "$tmp/late/idle" >"$tmp/out" 2>&1
+check "a run without end says how long it computed" grep -q 'no end after 6 s, of which it computed for [0-9.]* s' "$tmp/lated/slow/grade.json"
+check "and staff have to look" grep -q '"flag": "'"'point' had not ended after 6 s, of which it computed" "$tmp/lated/slow/grade.json"
+check "nobody promises that another run gets the same" bash -c "! grep -q 'gets the same points' '$tmp/lated/slow/index.html'"
+check "nor says that images differ where there is none" bash -c "! grep -q 'images differ' '$tmp/lated/slow/index.html'"
+check "one that waits (control)" grep -q '"wrong": ".*no end after 6 s"' "$tmp/lated/idle/grade.json"
+check "is nobody's to look at for that" bash -c "! grep -q '\"flag\": \".*computed' '$tmp/lated/idle/grade.json'"
+
 # Another rubric for the same images: they are judged anew, not rendered; --again renders them (control).
 times() { (cd "$1" && grep -h '"wall_s"' */grade.json); }
 sed 's/^check point 4/check point 5/; s/^check cornell 6/check cornell 5/; s/0.06 0.2/0.06 0.3/' "$rubric" >"$tmp/other.rubric"

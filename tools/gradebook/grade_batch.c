@@ -134,6 +134,38 @@ static void tell_failed(const struct rubric *r, const struct submitted_images *h
     }
 }
 
+/* Did the check lose points by an image that was starved, or not run because one was? Another run may make it. */
+static bool is_starved(const struct submitted_images *h, const struct rubric *r,
+                       const struct rubric_check *c)
+{
+    bool any = false, here = false;
+    for (int i = 0; i < r->num_images; i++)
+        any = any || h->made[i].starved;
+    for (int k = 0; any && k < c->num_images; k++) {
+        const struct made *made = &h->made[c->images[k]];
+        here = here || made->starved || (made->end == SANDBOX_WALL && made->wall_s <= 0);
+    }
+    return here;
+}
+
+/* Staff are told of the first image that was starved; nobody else knows how busy the machine was. */
+static void flag_starved(const struct rubric *r, const struct submitted_images *h, json_t *grade)
+{
+    char text[400];
+    for (int i = 0; i < r->num_images; i++) {
+        const struct made *made = &h->made[i];
+        if (!made->starved)
+            continue;
+        snprintf(
+            text, sizeof text,
+            "'%s' had not ended after %g s, of which it computed for %.2g s: if the machine was busy, "
+            "grade it with --again, or with a larger 'limit wall'",
+            r->image[i].name, r->limit.wall_s, made->cpu_s);
+        json_object_set_new(grade, "flag", json_string(text));
+        return;
+    }
+}
+
 /* What was done wrong: what all checks say of it, and what those do that students may see. */
 struct conclusion {
     struct mistake all, shown;
@@ -176,6 +208,8 @@ static bool add_checks(const struct collect *c, struct submitted_images *h, json
     for (int i = 0; ok && i < r->num_checks; i++) {
         tell_provisional(r, h, &r->check[i], &result[i]);
         tell_failed(r, h, &r->check[i], &result[i]);
+        if (is_starved(h, r, &r->check[i]))
+            result[i].chance = 1;
         provisional |= result[i].more > 0;
         json_array_append_new(checks, check_json(r, &r->check[i], &result[i]));
         part[r->check[i].part] += r->check[i].points * result[i].share;
@@ -230,8 +264,10 @@ static bool grade_made(const struct grade_job *job, struct submission *s, const 
             json_string("images were handed in, and no program that makes them: nobody knows whose "
                         "they are ('allow images' in the rubric, if they are what it asks for)"));
     ok = ok && add_checks(&c, h, grade, &mistake, e);
-    if (ok)
+    if (ok) {
+        flag_starved(job->rubric, h, grade);
         add_mistake(job, &mistake.all, grade);
+    }
     if (ok && mistake.all.judged && mistake.hides) {
         json_t *shown = json_object();
         add_mistake(job, &mistake.shown, shown);

@@ -34,6 +34,14 @@ bool grade_is_full(const json_t *check)
     return member_number(check, "share") >= 1;
 }
 
+bool grade_differs(const json_t *grade)
+{
+    json_each(c, json_object_get(grade, "checks"))
+        if (!grade_is_full(c) && json_is_array(json_object_get(c, "relative")))
+            return true;
+    return false;
+}
+
 bool grade_is_provisional(const json_t *object)
 {
     json_each(c, json_object_get(object, "checks"))

@@ -2,6 +2,7 @@
  * build's log. */
 #include "student_page.h"
 
+#include "grade_needs.h"
 #include "reference/base/json_node.h"
 #include "renderer/base/fs.h"
 #include "tools/html/html.h"
@@ -29,6 +30,8 @@ void grade_summary_bug(FILE *f, const json_t *grade)
     const json_t *diagnosis = json_object_get(grade, "diagnosis"),
                  *named = json_object_get(diagnosis, "named");
     const char *located = member_or_empty(grade, "located");
+    const bool unknown =
+        grade_differs(grade) && strcmp(member_or_empty(diagnosis, "finding"), "unknown") == 0;
     if (json_array_size(named) > 0) {
         fprintf(f, "<div class=\"finding\"><p>This looks like %s:</p><ul>\n",
                 json_array_size(named) > 1 ? "one of these, which these images cannot tell apart"
@@ -48,8 +51,8 @@ void grade_summary_bug(FILE *f, const json_t *grade)
         if (located[0] != '\0')
             html_print(f, "<p>It shows <b>%s</b>.</p>\n", located);
         fputs("</div>\n", f);
-    } else if (located[0] != '\0' ||
-               strcmp(member_or_empty(diagnosis, "finding"), "unknown") == 0) {
+    } else if (located[0] != '\0' || unknown ||
+               json_array_size(json_object_get(diagnosis, "parts")) > 0) {
         fputs("<div class=\"finding\">", f);
         const bool looked = json_object_get(diagnosis, "finding") != NULL;
         if (located[0] != '\0')
@@ -57,7 +60,7 @@ void grade_summary_bug(FILE *f, const json_t *grade)
                        looked ? "No known mistake explains all of it. It shows"
                               : "What is wrong shows",
                        located);
-        else
+        else if (unknown)
             fputs(
                 "<p>The images differ from the right ones in a way that no known mistake explains.</p>\n",
                 f);

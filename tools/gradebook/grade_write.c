@@ -76,7 +76,7 @@ static void describe_whole(const json_t *grade, char *out, size_t size)
         text_append(out, size, "Some points are provisional, until staff have looked.\n");
     if (located[0] != '\0')
         text_append(out, size, "What is wrong shows %s.\n", located);
-    else if (strcmp(member_or_empty(diagnosis, "finding"), "unknown") == 0)
+    else if (strcmp(member_or_empty(diagnosis, "finding"), "unknown") == 0 && grade_differs(grade))
         text_append(out, size,
                     "Different from the right images in a way that no known bug explains.");
     json_array_foreach(json_object_get(diagnosis, "named"), i, b) {

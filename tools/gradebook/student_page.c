@@ -36,6 +36,8 @@ static void show_chance(FILE *f, double chance, bool moves, const char *here)
     fputs("<p class=\"where\">", f);
     if (moves)
         fputs("Between none and all, points move a little with the noise of each run.", f);
+    else if (chance >= 1)
+        fprintf(f, "Another run of the same program may get other points%s.", here);
     else if (chance >= 1e-4)
         fprintf(f, "Another run of the same program gets other points%s with a chance of %.2g %%.",
                 here, 100 * chance);
@@ -43,6 +45,18 @@ static void show_chance(FILE *f, double chance, bool moves, const char *here)
         fprintf(f, "Another run of the same program gets the same points%s, but for 1 in 10 000.",
                 here);
     fputs("</p>\n", f);
+}
+
+/* Is nothing known of what another run would get in some check (grade_batch.c)? */
+static bool may_change(const json_t *grade)
+{
+    json_each(c, json_object_get(grade, "checks")) {
+        const double share = member_number(c, "share");
+        if (member_number(c, "chance") >= 1 && (share <= 0 || share >= 1) &&
+            member_text(c, "appeal") == NULL)
+            return true;
+    }
+    return false;
 }
 
 /* Does it stand before the fold? */
@@ -197,7 +211,8 @@ static void show_head(const struct page *p)
                    member_number(json_object_get(grade, "before"), "of"));
     if (member_text(grade, "trouble") == NULL && state == NULL &&
         strcmp(member_or_empty(grade, "kind"), "images") != 0)
-        show_chance(f, member_number(grade, "chance"), member_number(grade, "chance") >= 1, "");
+        show_chance(f, member_number(grade, "chance"),
+                    member_number(grade, "chance") >= 1 && !may_change(grade), "");
 }
 
 static void fact(FILE *f, const char *what, const char *value)

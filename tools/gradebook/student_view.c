@@ -59,11 +59,10 @@ static json_t *shown_parts(const json_t *grade, const json_t *checks)
         json_each(c, checks)
             any = any || strcmp(member_or_empty(c, "part"), number) == 0;
         if (any)
-            json_array_append_new(parts,
-                                  json_pack("{ss, ss, sf, sf}", "number", number, "title",
-                                            member_or_empty(p, "title"), "points",
-                                            sum_of(checks, number, "points"), "of",
-                                            sum_of(checks, number, "of")));
+            json_array_append_new(parts, json_pack("{ss, ss, sf, sf}", "number", number, "title",
+                                                   member_or_empty(p, "title"), "points",
+                                                   sum_of(checks, number, "points"), "of",
+                                                   sum_of(checks, number, "of")));
     }
     return parts;
 }

@@ -4,6 +4,7 @@
 #include "renderer/base/sha256.h"
 
 #include <errno.h>
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include <strings.h>
@@ -271,6 +272,14 @@ static bool move_file(const char *from_dir, const char *name, const char *to, bo
     return !*moved || fs_copy(from.s, to, e);
 }
 
+/* struct made. A program has no more than its limit, and no more than its threads can use. */
+static bool is_starved(const struct sandbox_limits *limit, int threads,
+                       const struct sandbox_result *run)
+{
+    const double most = fmin(limit->cpu_s, limit->wall_s * fmax(1, threads));
+    return run->end == SANDBOX_WALL && run->cpu_s > 0.1 * most && run->cpu_s < 0.9 * most;
+}
+
 static bool run_program(const struct rubric *r, const struct sandbox *box,
                         const struct submission *sub, const struct rubric_image *p,
                         const char *stage, const char *work, const char *out_dir, uint64_t seed,
@@ -302,6 +311,7 @@ static bool run_program(const struct rubric *r, const struct sandbox *box,
     made->end = result.end;
     made->cpu_s = result.cpu_s;
     made->wall_s = result.wall_s;
+    made->starved = is_starved(&r->limit, threads, &result);
     bool there = false, has_rates = false;
     snprintf(made->path, sizeof made->path, "%s/%s%s", out_dir, p->name, dot);
     snprintf(made->rates, sizeof made->rates, "%s/%s_rate.png", out_dir, p->name);
@@ -315,6 +325,10 @@ static bool run_program(const struct rubric *r, const struct sandbox *box,
         snprintf(made->after, sizeof made->after, "%.250s", result.why);
     else if (result.end == SANDBOX_FAILED && (result.status == 126 || result.status == 127))
         snprintf(made->why, sizeof made->why, "the program does not start: %s", result.why);
+    else if (made->starved)
+        snprintf(made->why, sizeof made->why,
+                 "the program: no end after %g s, of which it computed for %.2g s%s",
+                 r->limit.wall_s, result.cpu_s, result.why + strcspn(result.why, ":"));
     else if (result.end != SANDBOX_OK)
         snprintf(made->why, sizeof made->why, "the program: %s", result.why);
     else if (!there)

@@ -46,6 +46,9 @@ struct made {
     char after[300];              /* how the run failed that had written it; "": it did not fail */
     enum sandbox_end end;
     bool usage; /* there is none, and the program printed its usage text */
+    /* There is none, as it did not end; but of the processor time that it could have had until then it had 10 % to 90 %.
+     * One that loops takes all of it and one that waits none, on any machine: this one may be slow or the machine busy. */
+    bool starved;
     double cpu_s, wall_s;
 };
 

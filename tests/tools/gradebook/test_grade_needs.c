@@ -65,3 +65,15 @@ TEST(all_reasons_are_in_one_line_as_far_as_it_reaches)
         assert_memory_equal(said, "two main(); floor: not judged", strlen(said));
     }
 }
+
+/* A check without its image was compared with nothing. */
+TEST(images_differ_where_one_was_compared_and_lost)
+{
+    json_auto_t *none = with_check("relative", json_null()),
+                *one = with_check("relative", json_pack("[f]", 0.5)),
+                *right = with_check("relative", json_pack("[f]", 0.0));
+    json_object_set_new(json_array_get(json_object_get(right, "checks"), 0), "share", json_real(1));
+    assert_false(grade_differs(none));
+    assert_true(grade_differs(one));
+    assert_false(grade_differs(right));
+}
