@@ -172,8 +172,10 @@ static bool check_equal(struct judging *w, struct result *out, struct err *e)
     if (rubric_is_adaptive(p) && !grade_checks_stops(w->g, &stops, e))
         return false;
     if (!stops) {
-        snprintf(out->seen, sizeof out->seen,
-                 "no pixel of any image stopped early: there is no adaptive sampling");
+        snprintf(
+            out->seen, sizeof out->seen,
+            "the rate images say that no pixel of any image stopped early: adaptive sampling is missing, or they "
+            "are wrong");
         return true;
     }
     if (!judging_find_usable(w, out, e))

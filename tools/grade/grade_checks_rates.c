@@ -45,7 +45,11 @@ bool grade_checks_judge_rates(struct judging *w, struct result *out, struct err 
     }
     double half = stats_normal_quantile(w->g->alpha / 2) * rates.sd;
     struct interval count = {rates.more, rates.more - half, rates.more + half, rates.sd};
-    if (score_share(&c->count, &count) < 1 && rubric_is_adaptive(judging_image(w, 0)) &&
+    /* A noisy program may rightly take many samples, but not all of them where there is no noise. */
+    bool stops = rates.early > 0;
+    if (!stops && !grade_checks_stops(w->g, &stops, e))
+        return false;
+    if (stops && score_share(&c->count, &count) < 1 && rubric_is_adaptive(judging_image(w, 0)) &&
         !widen_count(w, rates.mean / (1 + rates.more), &count, out, e))
         return false;
     out->share = score_pixels(&c->share, rates.odd, rates.pixels);
@@ -58,7 +62,7 @@ bool grade_checks_judge_rates(struct judging *w, struct result *out, struct err 
         out->seen, sizeof out->seen,
         "%.0f of %.0f pixels stand for no multiple of %d; %.0f stopped early; %.4g samples a pixel on average, %+.2f %% from ours (%+.2f to %+.2f)",
         rates.odd, rates.pixels, c->batch, rates.early, rates.mean, 100 * count.value,
-        100 * count.lo, 100 * count.hi);
+        100 * fmax(-1, count.lo), 100 * count.hi); /* no count is below 0 */
     return true;
 }
 

@@ -726,8 +726,51 @@ TEST(what_never_stops_is_not_adaptive)
         MUST(image_write_png(t->h.made[1].rates, WIDTH, HEIGHT, rate, &e));
         OWN(result) out = run_check(t);
         if (out.share != cases[k].share ||
-            (out.share == 0 && strstr(out.seen, "no adaptive sampling") == NULL))
+            (out.share == 0 && strstr(out.seen, "adaptive sampling is missing") == NULL))
             fail_msg("case %zu: %g of the points: %s", k, out.share, out.seen);
+    }
+}
+
+/* All samples of a noisy image, where ours takes a quarter of them, are right for a program that stops where there is no noise; for one
+ * whose rate images always show all they say nothing. */
+TEST(all_samples_are_not_right_for_what_never_stops)
+{
+    static uint8_t all[3 * PIXELS], few[3 * PIXELS];
+    struct err e;
+    OWN(moments) flat = {0}, ours = {0};
+    MUST(moments_alloc(&flat, WIDTH, HEIGHT, &e) && moments_alloc(&ours, WIDTH, HEIGHT, &e));
+    for (size_t p = 0; p < PIXELS; p++) {
+        flat.n[p] = 24;
+        ours.n[p] = 64;
+        all[3 * p] = 255;
+        few[3 * p + 1] = 48;
+        few[3 * p + 2] = 207;
+    }
+    for (size_t i = 0; i < 3 * PIXELS; i++)
+        flat.mean[i] = 0.5;
+    for (int never = 0; never < 2; never++) {
+        struct task *t = start(CHECK_RATES, 2, 1e-5);
+        t->r.num_checks = 2;
+        t->r.check[0].num_images = 1;
+        t->r.check[0].batch = 24;
+        t->r.check[0].share = (struct margin){0.01, 0.3, true};
+        t->r.check[0].count = (struct margin){0.1, 0.2, true};
+        t->r.check[1] = t->r.check[0];
+        t->r.check[1].images[0] = 1;
+        for (int i = 0; i < 2; i++) {
+            snprintf(t->r.image[i].options, sizeof t->r.image[i].options, "-a 24 0.1");
+            snprintf(t->h.made[i].rates, sizeof t->h.made[i].rates, "%s",
+                     test_path(i == 0 ? "noisy.png" : "flat.png"));
+            MUST(image_write_png(t->h.made[i].rates, WIDTH, HEIGHT, i == 0 || never ? all : few,
+                                 &e));
+            t->h.image[i] =
+                submit_render(&(struct bug){.scale = 1, .square = 1, .noise = 0.25}, SPP);
+        }
+        t->a.of[0][0].as_asked = ours;
+        t->a.of[0][1].as_asked = t->a.of[0][1].noise = flat;
+        OWN(result) out = run_check(t);
+        if (out.share != (never ? 0 : 1))
+            fail_msg("%s: %g of the points: %s", never ? "never" : "stops", out.share, out.seen);
     }
 }
 
