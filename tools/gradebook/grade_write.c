@@ -7,7 +7,6 @@
 #include "reference/base/utc_date.h"
 #include "renderer/base/fs.h"
 #include "student_page.h"
-#include "student_view.h"
 #include "tools/base/text.h"
 #include "tools/html/html.h"
 #include "tools/results/results.h"

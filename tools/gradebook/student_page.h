@@ -9,11 +9,19 @@
 #include <stdio.h>
 
 /* The student's page of one grade (grade_batch.h), whose images are in dir/ID: lost points first;
- * only visible checks and what follows from them (student_view.h), no references, nothing meant for staff. Fails only
+ * only visible checks and what follows from them (student_view()), no references, nothing meant for staff. Fails only
  * out of memory. */
 NODISCARD bool student_page(FILE *f, const char *dir, const json_t *grade, struct err *e);
 
-/* The same for staff: everything, beside the references if rubric and answers are given (NULL: they are not). */
+/* May the student see the check now (its `visibility`)? */
+bool student_view_shows(const json_t *check);
+
+/* The grade (tools/docs/formats/grades.md) as if the rubric had only the checks that the student may see: their
+ * points, by part and in all, and what is said of the mistake from their images alone ("for_student"). The same where
+ * all may be seen. A new reference, which shares members with `grade`; NULL: out of memory. */
+json_t *student_view(const json_t *grade);
+
+/* student_page() for staff: everything, beside the references if rubric and answers are given (NULL: they are not). */
 NODISCARD bool student_page_for_staff(FILE *f, const char *dir, const struct rubric *r,
                                       const struct answer_key *a, const json_t *grade,
                                       struct err *e);

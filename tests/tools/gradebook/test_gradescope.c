@@ -4,7 +4,7 @@
 
 #include "renderer/base/fs.h"
 #include "tools/gradebook/grade_batch.h"
-#include "tools/gradebook/student_view.h"
+#include "tools/gradebook/student_page.h"
 #include "tests/support/own.h"
 #include "tests/support/test.h"
 
