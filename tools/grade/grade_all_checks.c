@@ -1,5 +1,7 @@
 /* All checks of a submission, with the set of accepted deviations that leaves the most points. */
 #include "grade_checks.h"
+#include "rubric_bugs.h"
+#include "tools/base/text.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -42,6 +44,30 @@ static bool explains(const struct rubric *r, const double *plain, const struct r
     return false;
 }
 
+static bool changes_image(const struct grading *g, const struct rubric_check *c, int set)
+{
+    for (int i = 0; i < c->num_images; i++)
+        if (rubric_bugs_set(g->a, set, c->images[i]) != 0)
+            return true;
+    return false;
+}
+
+void grade_checks_accept(const struct grading *g, const struct rubric_check *c, int set,
+                         struct result *out)
+{
+    const struct rubric *r = g->r;
+    out->accepted[0] = '\0';
+    for (int a = 0; set < 1 << r->num_accepted && a < r->num_accepted; a++) {
+        const struct accepted *by = &r->accept[a];
+        if (set >> a & 1 && changes_image(g, c, 1 << a))
+            text_append(out->accepted, sizeof out->accepted, "%s%s",
+                        out->accepted[0] != '\0' ? "; " : "",
+                        by->words[0] != '\0' ? by->words : by->name);
+    }
+    if (out->accepted[0] == '\0')
+        snprintf(out->accepted, sizeof out->accepted, "%s", r->set[set].name);
+}
+
 bool grade_all_checks(const struct grading *g, struct result *out, int *set, struct err *e)
 {
     static const double worth_telling = 0.01; /* of all points */
@@ -70,7 +96,7 @@ bool grade_all_checks(const struct grading *g, struct result *out, int *set, str
     }
     for (int i = 0; ok && *set > 0 && i < g->r->num_checks; i++)
         if (out[i].share > plain[i])
-            snprintf(out[i].accepted, sizeof out[i].accepted, "%s", g->r->set[*set].name);
+            grade_checks_accept(g, &g->r->check[i], *set, &out[i]);
     free(tried);
     return ok;
 }

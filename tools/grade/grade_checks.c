@@ -340,8 +340,10 @@ static bool check_noise(struct judging *w, struct result *out, struct err *e)
         !submitted_image_from(judging_reference(w, 1), q, rq, e))
         return false;
     if (!difference_related(q, rq, w->use)) {
-        snprintf(out->seen, sizeof out->seen, "%s is no image of its scene",
+        snprintf(out->seen, sizeof out->seen,
+                 "%s differs too much from the right image for its noise to be judged",
                  judging_image(w, 1)->name);
+        out->no_hint = true;
         out->more = 0;
     } else if (difference_noise(p, rp, q, rq, w->use, w->g->alpha, &i, &why)) {
         snprintf(out->seen, sizeof out->seen, "%.3g times as much (%.3g to %.3g)", exp(i.value),
@@ -366,8 +368,10 @@ static bool check_growth(struct judging *w, struct result *out, struct err *e)
     grade_checks_growth(w->g, w->check, out);
     if (is_wrong && w->g->h->made[w->check->images[0]].cpu_s > 0) {
         out->share = 0;
-        snprintf(out->seen, sizeof out->seen, "%s is no image of its scene",
+        snprintf(out->seen, sizeof out->seen,
+                 "%s differs too much from the right image for its time to count",
                  judging_image(w, 0)->name);
+        out->no_hint = true;
     }
     return true;
 }

@@ -61,7 +61,9 @@ struct result {
         [CHECK_IMAGES]; /* variance that each image of the check adds, in arbitrary units; or skewness,
                          * where that keeps it undecided */
     char expected[256], seen[400];
-    char accepted[160]; /* the deviations by which it has more points than without, or "" */
+    char
+        accepted[500]; /* what students read of the deviations by which it has more points, or "" */
+    bool no_hint;      /* what is wrong is not what the check's hint is about */
     char carried[512];  /* what was paid before and is taken for granted here (carried.h), or "" */
     char flag[256];     /* for staff only */
     int image;          /* that shows it best: index in the rubric */
@@ -122,6 +124,9 @@ NODISCARD bool grade_checks_stops(const struct grading *g, bool *stops, struct e
  * each result with result_free(); on failure there is nothing to free. */
 NODISCARD bool grade_all_checks(const struct grading *g, struct result *out, int *set,
                                 struct err *e);
+/* Says by which deviations of the set the check has more points: those that change an image of it. */
+void grade_checks_accept(const struct grading *g, const struct rubric_check *c, int set,
+                         struct result *out);
 void result_free(struct result *r);
 
 #endif

@@ -20,7 +20,7 @@ static bool grade_with(const struct grading *g, int set, struct result *result, 
         result_free(better ? &result[i] : &other);
         if (better) {
             result[i] = other;
-            snprintf(result[i].accepted, sizeof result[i].accepted, "%s", g->r->set[set].name);
+            grade_checks_accept(g, &g->r->check[i], set, &result[i]);
         }
     }
     return true;

@@ -72,9 +72,10 @@ static json_t *check_json(const struct rubric *r, const struct rubric_check *c,
         "kind", rubric_check_kind_name[c->kind], "part", r->part[c->part].number, "name", c->name,
         "title", c->title, "points", c->points * result->share, "of", c->points, "share",
         result->share, "chance", result->chance, "judged", result->judged, "provisional",
-        result->more > 0, "expected", result->expected, "seen", result->seen, "hint", c->hint,
-        "where", c->where, "visibility", c->visibility, "accepted", result->accepted, "carried",
-        result->carried, "flag", result->flag, "picture", r->image[result->image].name, "tile",
+        result->more > 0, "expected", result->expected, "seen", result->seen, "hint",
+        result->no_hint ? "" : c->hint, "where", c->where, "visibility", c->visibility, "accepted",
+        result->accepted, "carried", result->carried, "flag", result->flag, "picture",
+        r->image[result->image].name, "tile",
         result->agreement.tiles > 0
             ? json_pack("[i, i]", result->agreement.tile_x, result->agreement.tile_y)
             : json_null(),

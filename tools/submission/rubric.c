@@ -324,6 +324,21 @@ static void read_accept(struct statement *s)
     ++*num;
 }
 
+/* Of a deviation of the whole program that is accepted above. */
+static void read_explain(struct statement *s)
+{
+    struct accepted of = {0};
+    if (!take_name(s, "explain", of.name, sizeof of.name))
+        return;
+    take_text(s, "explain NAME", of.words, sizeof of.words);
+    for (int i = 0; i < s->r->num_accepted; i++)
+        if (strcmp(s->r->accept[i].name, of.name) == 0) {
+            memcpy(s->r->accept[i].words, of.words, sizeof of.words);
+            return;
+        }
+    rubric_mistake(s->m, s->line, "no deviation '%s' is accepted above", of.name);
+}
+
 /* Stands once, before any {variant}. */
 static void read_variants(struct statement *s)
 {
@@ -380,6 +395,7 @@ static const struct member of_rubric[] = {{"rubric", TEXT, TO(rubric, title)},
                                           {"budget", .read = read_budget},
                                           {"mask", .read = read_mask},
                                           {"allow", .read = read_allow},
+                                          {"explain", .read = read_explain, .many = true},
                                           {"picture", .read = read_picture, .many = true},
                                           {"part", .read = read_part, .many = true},
                                           {"check", .read = read_check, .many = true},

@@ -43,6 +43,7 @@ struct accepted {
     int line;
     char name[48];
     char how[256]; /* options of our renderer (of an image: if they begin with -), or a moments file */
+    char words[160]; /* what students read of it; "": its name */
 };
 
 /* A set of accepted deviations that a program may have all at once. The first set is empty. */

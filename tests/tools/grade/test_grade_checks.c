@@ -504,6 +504,31 @@ TEST(what_is_accepted_costs_nothing_and_hides_nothing)
     end(t);
 }
 
+/* Of two deviations only the one that changes the image is told, in the rubric's words where it has some. */
+TEST(only_what_changes_the_image_is_told)
+{
+    struct task *t = start(CHECK_EQUAL, 1, 1e-5);
+    struct rubric *r = &t->r;
+    struct moments *m = &t->a.of[1][0].m;
+    struct result out;
+    struct err e;
+    MUST(moments_alloc(m, WIDTH, HEIGHT, &e));
+    r->num_accepted = 2;
+    r->num_sets = 4;
+    strcpy(r->accept[0].name, "bright");
+    strcpy(r->accept[1].name, "rough");
+    strcpy(r->set[2].name, "rough");
+    grade_checks_accept(&t->g, &r->check[0], 3, &out);
+    assert_string_equal(out.accepted, "bright");
+    strcpy(r->accept[0].words, "the lamp is too bright");
+    grade_checks_accept(&t->g, &r->check[0], 3, &out);
+    assert_string_equal(out.accepted, "the lamp is too bright");
+    grade_checks_accept(&t->g, &r->check[0], 2, &out);
+    assert_string_equal(out.accepted, "rough");
+    moments_free(m);
+    end(t);
+}
+
 /* The mark of the staff's library: masked, it costs nothing; one pixel of the mask too few, or a bug beside it, does. */
 TEST(a_watermark_is_masked)
 {
@@ -790,8 +815,12 @@ TEST(growth_is_that_of_samples_alone)
         {{0.02, 0.03, 0.03, 0.02}, {.scale = 1, .square = 1, .noise = 1}, 1, 1, "times as long"},
         {{0.03, 0.02, 0.02, 0.03}, {.scale = 1, .square = 1, .noise = 1}, 1, 1, "times as long"},
         {{0}, {.scale = 1, .square = 1, .noise = 1}, 0, 0, "no program ran"},
-        {{0.02, 0.01, 0.02, 0.01}, {.scale = 0, .square = 1, .noise = 1}, 0, 0, "no image of"},
-        {{0.02, 0.01, 0.02, 0.01}, {.scale = 1, .white = true, .noise = 1}, 0, 0, "no image of"},
+        {{0.02, 0.01, 0.02, 0.01}, {.scale = 0, .square = 1, .noise = 1}, 0, 0, "differs too much"},
+        {{0.02, 0.01, 0.02, 0.01},
+         {.scale = 1, .white = true, .noise = 1},
+         0,
+         0,
+         "differs too much"},
     };
     for (size_t i = 0; i < COUNT(cases); i++) {
         struct task *t = start(CHECK_GROWTH, 4, 1e-5);

@@ -217,6 +217,7 @@ TEST(each_mistake_is_named_with_its_line)
         {1, 3, "rubric a\nmask 0 0 48 5\nmask 0 0 4 5", "second 'mask'"},
         {1, 2, "rubric a\naccept slow", "needs a text"},
         {1, 3, "rubric a\naccept x -a\naccept x -b", "already accepted in line 2"},
+        {1, 3, "rubric a\naccept x -a\nexplain y why", "no deviation 'y' is accepted above"},
         {1, 5, "rubric a\naccept x a\naccept y b\naccept z c\naccept t d", "more than 3"},
         {7, 8, " reference truth\n accept x nowhere.exr", "no file"},
         {7, 8, " reference truth\n accept x --fresnel schlick", "needs 'reference ours'"},
