@@ -49,7 +49,7 @@ static void describe(const json_t *c, char *out, size_t size)
         text_append(out, size, "\nDecided by staff: %s", appeal);
     if (accepted[0] != '\0')
         text_append(out, size,
-                    "\nExplained by what the starter code does (%s): no points lost for that.",
+                    "\nExplained by what you were given, no points lost for it: %s.",
                     accepted);
     if (!grade_is_full(c) && hint[0] != '\0')
         text_append(out, size, "\nHint: %s", hint);
