@@ -107,9 +107,9 @@ static double execution_time(const json_t *grade)
 
 /* Fields as documented at gradescope-autograders.readthedocs.io, "specs": points and texts of every check, no
  * score of the whole, which Gradescope adds up. */
-static json_t *gradescope(const json_t *grade)
+static json_t *gradescope(const json_t *grade, const json_t *view)
 {
-    json_t *tests = json_array(), *view = student_view(grade);
+    json_t *tests = json_array();
     size_t i, shown = 0;
     json_t *c;
     json_array_foreach(json_object_get(grade, "checks"), i, c) {
@@ -129,7 +129,6 @@ static json_t *gradescope(const json_t *grade)
     }
     char whole[2048];
     describe_whole(view, whole, sizeof whole);
-    json_decref(view);
     bool any = json_array_size(tests) > 0;
     json_t *root =
         json_pack("{so*, sf, ss, ss, ss, ss}", "output", json_string(whole), "execution_time",
@@ -259,9 +258,9 @@ static const char *const class_files[] = {"grades.csv", "junit.xml", "index.html
 static const char *const pages[] = {"index.html", "staff.html", NULL};
 
 /* Writes one of these files. grades: the array for a file of the class, one grade for a
- * submission's page. */
+ * submission's page; view: what the student may see of it. */
 static bool write_file(const char *out, const struct rubric *r, const struct answer_key *a,
-                       const json_t *grades, const char *name, struct err *e)
+                       const json_t *grades, const json_t *view, const char *name, struct err *e)
 {
     struct out_file o;
     bool of_class = json_is_array(grades), ok;
@@ -274,7 +273,10 @@ static bool write_file(const char *out, const struct rubric *r, const struct ans
     else if (strcmp(name, "staff.html") == 0)
         ok = student_page_for_staff(o.f, out, r, a, grades, e);
     else
-        ok = student_page(o.f, out, grades, e);
+        ok = student_page(o.f, out, view,
+                          json_array_size(json_object_get(view, "checks")) <
+                              json_array_size(json_object_get(grades, "checks")),
+                          e);
     if (ok)
         return out_commit(&o, e);
     out_abandon(&o);
@@ -286,13 +288,15 @@ bool grade_write(const char *out, const struct rubric *r, const struct answer_ke
 {
     bool ok = true;
     json_each(g, grades) {
+        json_t *view = student_view(g);
         ok = ok && write_json(fs_path("%s/%s/results.json", out, member_or_empty(g, "id")).s,
-                              gradescope(g), e);
+                              gradescope(g, view), e);
         for (int k = 0; ok && pages[k] != NULL; k++)
-            ok = write_file(out, r, a, g, pages[k], e);
+            ok = write_file(out, r, a, g, view, pages[k], e);
+        json_decref(view);
     }
     ok = ok && json_write(fs_path("%s/grades.json", out).s, grades, e);
     for (int k = 0; ok && class_files[k] != NULL; k++)
-        ok = write_file(out, r, a, grades, class_files[k], e);
+        ok = write_file(out, r, a, grades, NULL, class_files[k], e);
     return ok;
 }

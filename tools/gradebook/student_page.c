@@ -374,7 +374,7 @@ json_t *student_view(const json_t *grade)
     bool all = true;
     json_each(c, json_object_get(grade, "checks"))
         all = all && student_view_shows(c);
-    if (all || view == NULL)
+    if (all)
         return view;
     const json_t *told = json_object_get(grade, "for_student");
     for (size_t k = 0; k < sizeof about_mistake / sizeof *about_mistake; k++) {
@@ -392,15 +392,9 @@ json_t *student_view(const json_t *grade)
     return view;
 }
 
-bool student_page(FILE *f, const char *dir, const json_t *grade, struct err *e)
+bool student_page(FILE *f, const char *dir, const json_t *view, bool left_out, struct err *e)
 {
-    json_t *view = student_view(grade);
-    const bool left_out = json_array_size(json_object_get(view, "checks")) <
-                          json_array_size(json_object_get(grade, "checks"));
-    bool ok = (view != NULL || err_set(e, "out of memory")) &&
-              page(&(struct page){.f = f, .dir = dir, .grade = view, .left_out = left_out}, e);
-    json_decref(view);
-    return ok;
+    return page(&(struct page){.f = f, .dir = dir, .grade = view, .left_out = left_out}, e);
 }
 
 bool student_page_for_staff(FILE *f, const char *dir, const struct rubric *r,

@@ -8,20 +8,20 @@
 #include <jansson.h>
 #include <stdio.h>
 
-/* The student's page of one grade (grade_batch.h), whose images are in dir/ID: lost points first;
- * only visible checks and what follows from them (student_view()), no references, nothing meant for staff. Fails only
- * out of memory. */
-NODISCARD bool student_page(FILE *f, const char *dir, const json_t *grade, struct err *e);
+/* The student's page of what he may see of his grade (student_view()), with images in dir/ID: lost points first; no
+ * references, nothing meant for staff. left_out: there are checks that he may not see yet. Fails only out of memory. */
+NODISCARD bool student_page(FILE *f, const char *dir, const json_t *view, bool left_out,
+                            struct err *e);
 
 /* May the student see the check now (its `visibility`)? */
 bool student_view_shows(const json_t *check);
 
 /* The grade (tools/docs/formats/grades.md) as if the rubric had only the checks that the student may see: their
  * points, by part and in all, and what is said of the mistake from their images alone ("for_student"). The same where
- * all may be seen. A new reference, which shares members with `grade`; NULL: out of memory. */
+ * all may be seen. A new reference, which shares members with `grade`. */
 json_t *student_view(const json_t *grade);
 
-/* student_page() for staff: everything, beside the references if rubric and answers are given (NULL: they are not). */
+/* The page of one grade (grade_batch.h) for staff: everything, beside the references if rubric and answers are given (NULL: they are not). */
 NODISCARD bool student_page_for_staff(FILE *f, const char *dir, const struct rubric *r,
                                       const struct answer_key *a, const json_t *grade,
                                       struct err *e);
