@@ -21,7 +21,7 @@ writeFileSync(`${grades}/cyd/build.log`, "[1%] Building CXX object src/CMakeFile
 edit("dan", lose("not_started", "it does not start: libGLEW.so.2.2: cannot open shared object file"));
 edit("eve", lose("usage", "it printed its usage text for each image"));
 edit("fay", (g) => {
-  Object.assign(g.checks[1], { points: 6, share: 1, provisional: true });
+  Object.assign(g.checks[1], { points: 6, share: 1, provisional: true, visibility: "visible" });
   Object.assign(g, { points: 10, provisional: true, diagnosis: null });
   Object.assign(g.pictures[1], { runs: 12 });
   g.parts[1].points = 6;
@@ -34,4 +34,6 @@ edit("gus", (g) => {
       { name: "no_bounces", bug: "indirect light is not added", where: "Part 4", explained: 0.93, and: "inverse_r", and_bug: "light falls as 1/r", and_where: "Part 3" },
       { name: "one_bounce", bug: "only one bounce is traced", where: "Part 4", explained: 0.91 }] } });
   g.parts[0].points = 1.5;
+  g.checks[1].visibility = "visible";
+  g.for_student = { diagnosis: g.diagnosis, located: g.located, located_picture: g.located_picture };
 });
