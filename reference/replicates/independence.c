@@ -1,8 +1,5 @@
 #include "independence.h"
 
-#include "shared_noise.h"
-
-#include <assert.h>
 #include <gsl/gsl_cdf.h>
 #include <math.h>
 #include <stdlib.h>
@@ -175,8 +172,8 @@ static void judge(const struct sums *s, double alpha, double sharing, struct ind
                   fabs(out->batches_z) <= out->limit && out->square_failed == 0;
 }
 
-bool independence_test(const struct replicates *r, double alpha, struct independence *out,
-                       struct err *e)
+bool independence_test(const struct replicates *r, const struct shared_noise *shared, double alpha,
+                       struct independence *out, struct err *e)
 {
     size_t k = (size_t)r->num, side = (size_t)block_side(r);
     *out = (struct independence){.passed = true, .replicates = r->num, .block = (int)side};
@@ -189,13 +186,8 @@ bool independence_test(const struct replicates *r, double alpha, struct independ
     s.block = s.g + k * k;
     add_blocks(&s, r, (int)side, s.block + k * k);
     out->pixels = s.pixels;
-    struct shared_noise shared;
-    if (!shared_noise_measure(r, &shared, e)) {
-        free(s.g);
-        return false;
-    }
     for (int i = 0; i < NUM_SQUARES; i++) {
-        const struct square_noise *q = &shared.square[i < shared.num ? i : shared.num - 1];
+        const struct square_noise *q = &shared->square[i < shared->num ? i : shared->num - 1];
         out->square_r[i] = q->r;
         out->square_se[i] = q->se;
     }
@@ -229,7 +221,10 @@ static json_t *to_json(const struct independence *t)
 bool independence_check(const struct replicates *r, json_t *manifest, struct err *e)
 {
     struct independence t;
-    if (!independence_test(r, INDEPENDENCE_ALPHA, &t, e))
+    struct shared_noise shared = {0};
+    if (r->num >= SHARED_NOISE_FEWEST && !shared_noise_measure(r, &shared, e))
+        return false;
+    if (!independence_test(r, &shared, INDEPENDENCE_ALPHA, &t, e))
         return false;
     json_object_set_new(manifest, "independence", to_json(&t));
     if (t.passed)

@@ -28,7 +28,7 @@
 #ifndef ASSAY_INDEPENDENCE_H
 #define ASSAY_INDEPENDENCE_H
 
-#include "replicates.h"
+#include "shared_noise.h"
 
 #include <jansson.h>
 
@@ -60,9 +60,9 @@ struct independence {
     int square_failed; /* side of the square whose ratio is shown to be too large; 0: none */
 };
 
-/* False only out of memory. */
-NODISCARD bool independence_test(const struct replicates *r, double alpha, struct independence *out,
-                                 struct err *e);
+/* shared: what their pixels share (shared_noise_measure()); not read of fewer than 4. False only out of memory. */
+NODISCARD bool independence_test(const struct replicates *r, const struct shared_noise *shared,
+                                 double alpha, struct independence *out, struct err *e);
 /* The same, and adds all of it to the manifest as "independence"; a failed test is an error that says which. */
 NODISCARD bool independence_check(const struct replicates *r, json_t *manifest, struct err *e);
 

@@ -123,7 +123,7 @@ static bool measure_groups(const struct level *l, struct shared_noise *out, stru
 
 bool shared_noise_measure(const struct replicates *r, struct shared_noise *out, struct err *e)
 {
-    assert(r->num >= 3);
+    assert(r->num >= SHARED_NOISE_FEWEST);
     *out = (struct shared_noise){.width = r->width, .height = r->height};
     struct level l = {.nx = (r->width + 1) / 2, .ny = (r->height + 1) / 2, .num = r->num};
     const size_t squares = (size_t)l.nx * (size_t)l.ny, k = (size_t)r->num;

@@ -9,7 +9,7 @@
 
 #include "replicates.h"
 
-enum { MOST_SQUARE_SIZES = 24 };
+enum { MOST_SQUARE_SIZES = 24, SHARED_NOISE_FEWEST = 3 };
 /* Squares of one side that cut up the image, or groups of pixels. */
 struct square_noise {
     int side; /* 2, 4, 8, .. until one square is the image */
@@ -27,7 +27,7 @@ struct shared_noise {
     struct square_noise group[MOST_SQUARE_SIZES + 2];
 };
 
-/* At least 3 replicates. False only out of memory. */
+/* Of at least SHARED_NOISE_FEWEST replicates. False only out of memory. */
 NODISCARD bool shared_noise_measure(const struct replicates *r, struct shared_noise *out,
                                     struct err *e);
 

@@ -17,13 +17,14 @@ static const double sharing_alpha = 1e-6;     /* of "pixels share noise" where t
 static const double least_correlation = 0.1;  /* of two renders that share noise */
 enum { most_measured = 64 };                  /* renders that this is measured on */
 
-/* Refuses renders that share noise with each other: a seed used twice on two machines, a render that goes on from the one before.
- * Renders of unequal noise, as of equal times, are correlated a little without that. */
+/* Refuses renders that share noise with each other: a seed used twice on two machines, a render that goes on from the
+ * one before. Renders of unequal noise, as of equal times, are correlated a little without that. */
 static bool check_pairs(const char *path, const struct replicate_dir *from,
-                        const struct replicates *r, struct err *e)
+                        const struct replicates *r, const struct shared_noise *shared,
+                        struct err *e)
 {
     struct independence t;
-    if (!independence_test(r, sharing_alpha, &t, e))
+    if (!independence_test(r, shared, sharing_alpha, &t, e))
         return false;
     const bool next = t.neighbours_z > t.limit && t.neighbours_r > least_correlation - 1.0 / r->num;
     const bool pair = t.pair_z > t.pair_limit && t.pair_r > least_correlation - 1.0 / r->num;
@@ -61,7 +62,7 @@ static bool measure_sharing(const char *path, const struct replicate_dir *from, 
         if (unlimited != NULL)
             out->unlimited = *unlimited;
         else
-            ok = check_pairs(path, from, &r, e);
+            ok = check_pairs(path, from, &r, &s, e);
     }
     replicates_free(&r);
     return ok;

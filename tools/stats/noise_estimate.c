@@ -301,11 +301,12 @@ static bool level(const struct grid *d, const struct blocks *blocks, double *fac
         const double v = f.s2 / f.num, known = fmax(1, *factor);
         ok = ok && lines(&fine, false, v, known, &rows, e) &&
              lines(&fine, true, v, known, &columns, e);
-        if (ok)
+        if (ok) {
             *bound = *factor * dof / gsl_cdf_chisq_Pinv(level_error, dof) +
                      fmax(0, *factor - half) * fmax(1, q / (4 - q));
-        *bound = fmax(*bound, rows + columns - 1);
-        *factor = fmax(*factor, rows + columns - 1);
+            *bound = fmax(*bound, rows + columns - 1);
+            *factor = fmax(*factor, rows + columns - 1);
+        }
     }
     free(fine.v);
     free(twos.v);

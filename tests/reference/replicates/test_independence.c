@@ -34,8 +34,10 @@ static struct replicates draw_all(enum law law, int count, bool blur, uint64_t *
 static struct independence test(const struct replicates *r, double alpha)
 {
     struct independence out;
+    struct shared_noise shared = {0};
     struct err e;
-    assert_true(independence_test(r, alpha, &out, &e));
+    assert_true(r->num < SHARED_NOISE_FEWEST || shared_noise_measure(r, &shared, &e));
+    assert_true(independence_test(r, &shared, alpha, &out, &e));
     return out;
 }
 
