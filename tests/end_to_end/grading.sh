@@ -64,6 +64,23 @@ for what_is_lost in 'bounced off two surfaces' 'cornell'; do
     tell "but if the check is shown" "$(reads shown 2>&1 | grep -q "$what_is_lost" || echo "it is not")"
 done
 check "nor are its points" bash -c "grep -q 'bob: 4.00 of 4 points' '$tmp/two/bob/index.html' && grep -q 'bob: 4.00 of 10 points' '$tmp/shown/bob/index.html'"
+# Points are told to a hundredth: a check that loses less than half of one loses nothing, and no page then looks for a
+# mistake. Margins of a slope of 1 around what was measured: bob's 6 points less 0.003, and less 0.03 (control).
+for loss in 0.0005 0.005; do
+    python3 - "$loss" "$tmp" <<'END'
+import json, re, sys
+loss, tmp = float(sys.argv[1]), sys.argv[2]
+cornell = next(c for c in json.load(open(f"{tmp}/shown/bob/grade.json"))["checks"] if c["name"] == "cornell")
+tile = next(i for i in cornell["intervals"] if i["what"] == "furthest tile")
+full = max(tile["lo"], -tile["hi"]) - loss
+head, tail = open(f"{tmp}/shown.rubric").read().split("check cornell")
+tail = re.sub("(?m)^  image .*", "  image 0.98 0.99", re.sub("(?m)^  tile .*", f"  tile {full:.9f} {full + 1:.9f}", tail))
+open(f"{tmp}/loss-{loss}.rubric", "w").write(head + "check cornell" + tail)
+END
+    "$build/assay" grade -q -o "$tmp/loss-$loss" --before "$tmp/two" "$tmp/loss-$loss.rubric" "$tmp/submissions/bob" >"$tmp/out" 2>&1
+done
+check "a loss of 0.003 points is none" bash -c "grep -q '\"points\": 10.0' '$tmp/loss-0.0005/bob/grade.json' && ! grep -q 'class=\"finding\"\|What to look at' '$tmp/loss-0.0005/bob/index.html'"
+check "one of 0.03 is one" bash -c "grep -q 'bob: 9.97 of 10' '$tmp/loss-0.005/bob/index.html' && grep -q 'class=\"finding\"' '$tmp/loss-0.005/bob/index.html'"
 # The command on the page of staff, as a shell reads it, from where the class was graded.
 (cd "$tmp" && "$build/assay" grade -q -o "the class's" "$OLDPWD/$rubric" submissions/ada >/dev/null 2>&1)
 printed=$(python3 -c 'import html, re, sys

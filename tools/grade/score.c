@@ -37,3 +37,10 @@ double score_pixels(const struct margin *m, double wrong, double num)
     const struct interval i = {v, v, v, 0};
     return score_share(m, &i);
 }
+
+double score_round(double share, double points)
+{
+    if (points <= 0 || share <= 0)
+        return share;
+    return fmax(0, 1 - round(100 * points * (1 - share)) / (100 * points));
+}

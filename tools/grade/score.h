@@ -28,4 +28,8 @@ double score_chance(const struct margin *m, const struct interval *i);
  * wrong. */
 double score_pixels(const struct margin *m, double wrong, double num);
 
+/* The share that makes a hundredth of a point the least that a check worth `points` can lose, as pages
+ * write no more digits: "8.00 of 8" beside a mistake would contradict itself. */
+double score_round(double share, double points);
+
 #endif

@@ -173,8 +173,14 @@ struct conclusion {
     bool hides; /* are there others? */
 };
 
-/* Looks for the mistake of a submission that lost points, unless a check is flagged: a copied image
- * shows no bug. */
+static void round_points(const struct rubric *r, struct result *result)
+{
+    for (int i = 0; i < r->num_checks; i++)
+        result[i].share = score_round(result[i].share, r->check[i].points);
+}
+
+/* Rounds points, and looks for the mistake of a submission that lost some, unless a check is flagged: a
+ * copied image shows no bug. */
 static bool find_mistake(const struct grade_job *job, struct submitted_images *h, int *set,
                          struct result *result, struct conclusion *out, struct err *e)
 {
@@ -183,15 +189,18 @@ static bool find_mistake(const struct grade_job *job, struct submitted_images *h
     const int first = *set;
     bool lost = false, flagged = false;
     *out = (struct conclusion){.all.located.image = -1, .shown.located.image = -1};
+    round_points(job->rubric, result);
     for (int i = 0; i < job->rubric->num_checks; i++) {
         share[i] = result[i].share;
         lost |= share[i] < 1;
         flagged |= result[i].flag[0] != '\0';
         out->hides |= !rubric_is_shown(&job->rubric->check[i]);
     }
-    return !lost || flagged ||
-           (mistake_judge(&g, set, result, &out->all, e) &&
-            (!out->hides || mistake_shown(&g, first, share, &out->shown, e)));
+    bool ok = !lost || flagged ||
+              (mistake_judge(&g, set, result, &out->all, e) &&
+               (!out->hides || mistake_shown(&g, first, share, &out->shown, e)));
+    round_points(job->rubric, result); /* what came back */
+    return ok;
 }
 
 static bool add_checks(const struct collect *c, struct submitted_images *h, json_t *grade,

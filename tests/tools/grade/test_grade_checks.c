@@ -230,6 +230,12 @@ TEST(points_follow_the_interval)
     assert_true(fabs(score_chance(&wide, &at) / 2.866516e-7 - 1) < 1e-3);
     const struct interval between = {0.05, 0.04, 0.06, 0.002};
     assert_true(score_chance(&wide, &between) == 1);
+    /* To a hundredth of a point, by hand: 8 points less 0.004, less 0.006; all and none stay so, whatever it is
+     * worth. */
+    assert_true(score_round(0.9995, 8) == 1);
+    assert_true(fabs(8 * score_round(0.99925, 8) - 7.99) < 1e-12);
+    assert_true(score_round(1, 1.155) == 1 && score_round(0, 1.155) == 0);
+    assert_true(score_round(0.9999, 0) == 0.9999);
 }
 
 /* The printed chance is that of different points in another run: 20 000 further runs, normal around the estimate,
