@@ -244,16 +244,19 @@ static bool is_needed_beside(const struct bug_fit *f, const struct candidate *tw
     return 1 - two->explained <= most_left * (1 - (isnan(alone) ? 0 : alone));
 }
 
-/* The effects of two bugs do not exactly multiply: more than noise may be left if it is little of each view and no
- * other pair comes near. */
+/* More than noise may be left if no other bug, or pair, comes near. By a pair: if it is little of each view, as the
+ * effects of two bugs do not exactly multiply. By a single bug: if it is in no view more than correct programs leave,
+ * which together may leave more than noise. */
 static bool is_nearly_all(const struct bug_fit *f, const struct diagnose_options *opt,
                           const struct candidate *best, const struct candidate *next)
 {
     static const double least_gone = 0.97, most_left = 0.2, near = 0.1;
+    const bool is_pair = best->second >= 0;
     int clue;
-    return opt->by_likelihood && best->second >= 0 && best->explained >= least_gone &&
-           bug_fit_is_full(f, best) && bug_fit_worst(f, best, &clue) <= most_left &&
-           is_needed_beside(f, best, best->bug) && is_needed_beside(f, best, best->second) &&
+    return opt->by_likelihood && best->explained >= least_gone && bug_fit_is_full(f, best) &&
+           bug_fit_worst(f, best, &clue) <= (is_pair ? most_left : 0) &&
+           (!is_pair ||
+            (is_needed_beside(f, best, best->bug) && is_needed_beside(f, best, best->second))) &&
            (next == NULL || next->log_likelihood <= (1 - near) * best->log_likelihood);
 }
 

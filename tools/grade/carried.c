@@ -20,6 +20,8 @@ static const double bright = 0.5, clip_error = 0.05;
 /* Relative differences are taken over at least this share of the right image, as a bug may make a
  * cell black. */
 static const double dark = 0.1;
+/* An image that the bug leaves less than this share of its light shows nothing of what it is meant to show. */
+static const double black = 0.01;
 
 /* ---- which part pays? */
 
@@ -70,6 +72,8 @@ int carried_part_of(const struct rubric *r, const struct bug *b)
 struct carry {
     const struct grading *g;
     int with, bug[2], paid[2], num; /* bugs, and the parts in which they are paid */
+    bool is_right
+        [RUBRIC_PARTS]; /* parts of which a check had all points before anything was carried */
 };
 
 static bool loses(const struct rubric *r, const struct result *result, int part)
@@ -136,6 +140,7 @@ struct cells {
     double bias[SIGNATURE_VALUES]; /* bound of the systematic error, of one sign in all cells */
     double
         base[SIGNATURE_VALUES]; /* expected of the first image: what differences are relative to */
+    double light, lit;          /* of the first image with the bugs, and without, in all cells */
 };
 
 /* Adds sign (+1, -1) times an image. bugs: bit k adds the effect of w->bug[k] to what is
@@ -167,8 +172,11 @@ static bool add_image(const struct carry *w, int image, int sign, int bugs, stru
                 out->bias[i] += clip_error * (c->mean[i] + more);
             out->var[i] += s->var[i] + c->var[i] + pow(effect_error * more, 2) +
                            (effect != NULL ? (double)effect->var[i] : 0);
-            if (is_first)
+            if (is_first) {
                 out->base[i] = fmax(c->mean[i] + more, dark * c->mean[i]);
+                out->light += c->mean[i] + more;
+                out->lit += c->mean[i];
+            }
         }
     }
     free(seen);
@@ -217,13 +225,13 @@ static bool measure(const struct cells *s, double alpha, struct difference *out,
         if (out->relative == NULL)
             return err_set(e, "out of memory");
     }
-    const double black = 1e-6;
+    const double no_light = 1e-6;
     for (int c = 0; c < NUM_CHANNELS; c++) {
         struct sums all = sum_of(s, 0, 0, s->columns, s->rows, c);
-        out->image[c] = interval_of(&all, fmax(all.base, black), z);
+        out->image[c] = interval_of(&all, fmax(all.base, no_light), z);
     }
     struct sums whole = sum_of(s, 0, 0, s->columns, s->rows, CHANNEL_LUMINANCE);
-    double least = fmax(0.25 * whole.base * side * side / (s->columns * s->rows), black);
+    double least = fmax(0.25 * whole.base * side * side / (s->columns * s->rows), no_light);
     for (int t = 0; t < num; t++) {
         int x = t % columns * side, y = t / columns * side;
         struct sums tile = sum_of(s, x, y, side, side, CHANNEL_LUMINANCE);
@@ -270,7 +278,14 @@ static double share_off(const struct cells *s)
     return lit > 0 ? (double)off / lit : 1;
 }
 
-/* *is_judged: false where the check stays as it is: kind noise, or an image without a view. */
+/* Has the bug made the image black, in a part that nothing else shows to be right? */
+static bool is_blind(const struct carry *w, const struct rubric_check *c, const struct cells *s)
+{
+    return (c->kind == CHECK_EQUAL || c->kind == CHECK_GROWTH) && s->light < black * s->lit &&
+           !w->is_right[c->part];
+}
+
+/* *is_judged: false where the check stays as it is: kind noise, an image without a view, or one that shows nothing. */
 static bool judge(const struct carry *w, const struct rubric_check *c, int bugs, struct result *out,
                   bool *is_judged, struct err *e)
 {
@@ -286,7 +301,9 @@ static bool judge(const struct carry *w, const struct rubric_check *c, int bugs,
     bool ok = cells != NULL || err_set(e, "out of memory");
     for (int k = 0; ok && k < images; k++)
         ok = add_image(w, c->images[k], k == 0 ? 1 : -1, bugs, cells, e);
-    if (ok && c->kind == CHECK_EXACT) {
+    if (ok && is_blind(w, c, cells)) {
+        *is_judged = false;
+    } else if (ok && c->kind == CHECK_EXACT) {
         double off = share_off(cells);
         const struct interval i = {off, off, off, 0};
         out->share = score_share(&c->share, &i);
@@ -355,6 +372,8 @@ bool carried_by_name(const struct grading *g, int with, const struct diagnosis *
         find_payer(&w, found, 1, result);
     for (int k = 0; k < w.num; k++)
         paid[w.paid[k]] = true;
+    for (int i = 0; i < g->r->num_checks; i++)
+        w.is_right[g->r->check[i].part] |= result[i].share == 1 && g->r->check[i].points > 0;
     bool ok = true;
     for (int i = 0; ok && i < g->r->num_checks; i++)
         ok = carry_check(&w, i, &result[i], e);

@@ -140,6 +140,7 @@ static const struct {
     {"cosine_missing", "3", "4"},     {"diffuse_without_pi", "3", "4"},
     {"light_area_doubled", "3", "5"}, {"light_pdf_no_cosine", "3", NULL},
     {"indirect_missing", "4", "5"},   {"roulette_squared", "4", "5"},
+    {"emission_missing", "1", "2"}, /* its own part shows no lamp */
 };
 
 TEST(a_bug_costs_points_in_its_own_part)
@@ -186,13 +187,18 @@ static struct outcome grade_unknown(int bug, int second)
     return v;
 }
 
-static double share_of(const struct outcome *v, const char *check)
+static int check_number(const char *name)
 {
     for (int i = 0; i < of.rubric->num_checks; i++)
-        if (strcmp(of.rubric->check[i].name, check) == 0)
-            return v->share[i];
-    fail_msg("no check '%s'", check);
-    return 0;
+        if (strcmp(of.rubric->check[i].name, name) == 0)
+            return i;
+    fail_msg("no check '%s'", name);
+    return -1;
+}
+
+static double share_of(const struct outcome *v, const char *check)
+{
+    return v->share[check_number(check)];
 }
 
 static int image_number(const char *name)
@@ -376,6 +382,37 @@ TEST(nothing_is_carried_on_where_no_points_are_lost)
     }
     for (int i = 0; i < RUBRIC_PARTS; i++)
         assert_false(paid[i]);
+    bug_images_take_back(&of, h);
+}
+
+/* Lamps are black, and so are all images of Part 2 but those of its shadows: points come back if these are right, and not
+ * if these lost points too. */
+TEST(what_a_bug_makes_black_needs_another_check_that_is_right)
+{
+    static struct result result[RUBRIC_CHECKS];
+    const struct diagnosis found = {
+        .finding = FINDING_BUG,
+        .candidate = {{.bug = bug_images_number(&of, "emission_missing"),
+                       .second = -1,
+                       .amplitude = 1}},
+        .num_candidates = 1,
+        .num_named = 1};
+    struct submitted_images *h = bug_images_hand_in(&of, 0, found.candidate[0].bug, -1, 1);
+    const struct grading g = {of.rubric, of.answers, h, 1e-5, &of.bugs};
+    const int triangles = check_number("triangles"), shadows = check_number("shadows");
+    for (int wrong = 0; wrong < 2; wrong++) {
+        bool paid[RUBRIC_PARTS] = {false};
+        struct err e;
+        int set;
+        MUST(grade_all_checks(&g, result, &set, &e));
+        assert_true(result[triangles].share == 0 && result[shadows].share == 1);
+        if (wrong)
+            result[shadows].share = 0;
+        MUST(carried_by_name(&g, set, &found, result, paid, &e));
+        assert_true(result[triangles].share == (wrong ? 0 : 1));
+        for (int i = 0; i < of.rubric->num_checks; i++)
+            result_free(&result[i]);
+    }
     bug_images_take_back(&of, h);
 }
 
