@@ -141,6 +141,7 @@ static const struct {
     {"light_area_doubled", "3", "5"}, {"light_pdf_no_cosine", "3", NULL},
     {"indirect_missing", "4", "5"},   {"roulette_squared", "4", "5"},
     {"emission_missing", "1", "2"}, /* its own part shows no lamp */
+    {"bvh_leaf_first_hit", "2", "1"}, {"sphere_far_side_in_range", "1", NULL},
 };
 
 TEST(a_bug_costs_points_in_its_own_part)
