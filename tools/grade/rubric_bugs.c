@@ -109,14 +109,14 @@ static double progress(const struct rubric_image *p, double taken)
 }
 
 /* Expected FACT_SAMPLES of a rule: all counts within its range are equally likely, so `seen` is
- * clamped to it. */
-static void set_samples(const struct rubric_image *p, const struct stopping *s, double seen,
-                        double *fact, double *fact_sd)
+ * clamped to it. One that looks at no noise takes exactly one batch; where that is seen, others may have taken it too. */
+static void set_samples(const struct rubric_image *p, enum stopping_kind kind,
+                        const struct stopping *s, double seen, double *fact, double *fact_sd)
 {
     static const double ends =
         4; /* standard deviations in half the range: 3.3 of kappa, the shapes widen it (stopping_rule.c) */
-    static const double least_sd = 0.1;
     double lo = progress(p, s->least), hi = progress(p, s->most);
+    const double least_sd = kind == STOPS_AT_ONCE && seen > hi + 1e-6 ? 0 : 0.1;
     fact[FACT_SAMPLES] = fmin(fmax(seen, lo), hi);
     fact_sd[FACT_SAMPLES] = hypot((hi - lo) / 2 / ends, least_sd);
 }
@@ -185,8 +185,8 @@ static bool expect_samples(const struct grading *g, int set, int image, struct s
     own->effect = calloc((size_t)c->num_bugs, sizeof(struct effect *));
     if (own->effect == NULL)
         return err_set(e, "out of memory");
-    set_samples(p, &by[STOPS_RIGHTLY], clue->seen.fact[FACT_SAMPLES], own->correct.fact,
-                own->correct.fact_sd);
+    set_samples(p, STOPS_RIGHTLY, &by[STOPS_RIGHTLY], clue->seen.fact[FACT_SAMPLES],
+                own->correct.fact, own->correct.fact_sd);
     for (int k = 0; k < c->num_bugs; k++) {
         const struct effect *plain = clue->view->effect[k];
         enum stopping_kind kind = stopping_rule_of(c->bug[k].name);
@@ -200,7 +200,7 @@ static bool expect_samples(const struct grading *g, int set, int image, struct s
         own->effect[k] = mine;
         for (int f = 0; plain == NULL && f < NUM_FACTS; f++)
             mine->fact[f] = mine->fact_sd[f] = NAN;
-        set_samples(p, &by[kind], clue->seen.fact[FACT_SAMPLES], mine->fact, mine->fact_sd);
+        set_samples(p, kind, &by[kind], clue->seen.fact[FACT_SAMPLES], mine->fact, mine->fact_sd);
         if (strcmp(c->bug[k].name, "adaptive_mean_over_all") == 0 &&
             !expect_mean_over_all(p, g->h->made[image].rates, &own->correct, mine, e))
             return false;

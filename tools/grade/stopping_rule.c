@@ -12,7 +12,7 @@ static const double uncertain = 3.3; /* standard deviations of ln kappa */
 static const char *const bug_of[NUM_STOPPING_KINDS] = {
     [STOPS_BY_ONE_SIGMA] = "adaptive_one_sigma", [STOPS_BY_ABSOLUTE] = "adaptive_absolute",
     [STOPS_BY_N] = "adaptive_without_root",      [STOPS_BY_SIGMA] = "adaptive_without_root-whole",
-    [STOPS_NEVER] = "adaptive_never_stops",
+    [STOPS_AT_ONCE] = "adaptive_at_once",        [STOPS_NEVER] = "adaptive_never_stops",
 };
 
 /* A sample is c, or c + a with probability p; p 1: no fluctuation, as if mean and variance were known. */
@@ -38,6 +38,7 @@ static bool stops(enum stopping_kind by, double n, double mean, double variance,
     case STOPS_BY_ABSOLUTE: return 1.96 * sigma / sqrt(n) <= tolerance;
     case STOPS_BY_N: return 1.96 * sigma / n <= tolerance * mean;
     case STOPS_BY_SIGMA: return 1.96 * sigma <= tolerance * mean;
+    case STOPS_AT_ONCE: return true;
     case STOPS_NEVER:
     case NUM_STOPPING_KINDS: break;
     }

@@ -19,6 +19,7 @@ enum stopping_kind {
     STOPS_BY_ABSOLUTE,  /* 1.96 sqrt(var/n) <= tolerance */
     STOPS_BY_N,         /* 1.96 sqrt(var)/n <= tolerance mean */
     STOPS_BY_SIGMA,     /* 1.96 sqrt(var) <= tolerance mean */
+    STOPS_AT_ONCE,      /* after the first batch, whatever its noise */
     STOPS_NEVER,
     NUM_STOPPING_KINDS
 };

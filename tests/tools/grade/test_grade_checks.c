@@ -655,6 +655,8 @@ TEST(samples_go_by_the_rule_of_stopping)
         assert_true(by[STOPS_BY_N].most < by[STOPS_BY_ONE_SIGMA].least);
         assert_true(by[STOPS_BY_SIGMA].least > by[STOPS_RIGHTLY].most);
         assert_float_equal(by[STOPS_NEVER].least, SPP, 1e-9);
+        assert_float_equal(by[STOPS_AT_ONCE].least, 16, 1e-9);
+        assert_float_equal(by[STOPS_AT_ONCE].most, 16, 1e-9);
     }
     assert_int_equal(stopping_rule_of("adaptive_absolute"), STOPS_BY_ABSOLUTE);
     assert_int_equal(stopping_rule_of("cosine_missing"), STOPS_RIGHTLY);
