@@ -173,6 +173,14 @@ struct conclusion {
     bool hides; /* are there others? */
 };
 
+/* Other shares stay as they are for now: what comes back is compared with them. */
+static void give_all(const struct rubric *r, struct result *result)
+{
+    for (int i = 0; i < r->num_checks; i++)
+        if (score_round(result[i].share, r->check[i].points) == 1)
+            result[i].share = 1;
+}
+
 static void round_points(const struct rubric *r, struct result *result)
 {
     for (int i = 0; i < r->num_checks; i++)
@@ -189,7 +197,7 @@ static bool find_mistake(const struct grade_job *job, struct submitted_images *h
     const int first = *set;
     bool lost = false, flagged = false;
     *out = (struct conclusion){.all.located.image = -1, .shown.located.image = -1};
-    round_points(job->rubric, result);
+    give_all(job->rubric, result);
     for (int i = 0; i < job->rubric->num_checks; i++) {
         share[i] = result[i].share;
         lost |= share[i] < 1;
@@ -199,7 +207,7 @@ static bool find_mistake(const struct grade_job *job, struct submitted_images *h
     bool ok = !lost || flagged ||
               (mistake_judge(&g, set, result, &out->all, e) &&
                (!out->hides || mistake_shown(&g, first, share, &out->shown, e)));
-    round_points(job->rubric, result); /* what came back */
+    round_points(job->rubric, result);
     return ok;
 }
 

@@ -37,7 +37,8 @@ bool grade_is_full(const json_t *check)
 bool grade_differs(const json_t *grade)
 {
     json_each(c, json_object_get(grade, "checks"))
-        if (!grade_is_full(c) && json_is_array(json_object_get(c, "relative")))
+        if (!grade_is_full(c) && json_is_array(json_object_get(c, "relative")) &&
+            strcmp(member_or_empty(c, "kind"), "growth") != 0)
             return true;
     return false;
 }

@@ -15,7 +15,7 @@ const char *grade_state(const json_t *grade);
 bool grade_is_provisional(const json_t *object);
 /* Has a check all its points? */
 bool grade_is_full(const json_t *check);
-/* Does an image that could be compared differ from what it should be? */
+/* Does an image that could be compared differ from what it should be? Not one that only takes too long. */
 bool grade_differs(const json_t *grade);
 
 #endif
