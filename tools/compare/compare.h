@@ -104,9 +104,10 @@ struct comparison {
 };
 
 /* Checks the input first. Each failure is a line in e and false (could not judge): sizes differ, NaN, infinity,
- * negative radiance, negative M2, n < 3 where not exact (skewness is unknown then), an unknown unit, noise in an exact
- * side, replicates without any variance (the seed was ignored), the same observations on both sides, a black reference,
- * options out of range. A is the tested side, B the reference. The caller frees with comparison_free(). */
+ * negative M2, n < 3 where not exact (skewness is unknown then), an unknown unit, noise in an exact side, replicates
+ * without any variance (the seed was ignored), the same observations on both sides, a black reference, options out of
+ * range. Means below 0 are judged like others. A is the tested side, B the reference. The caller frees with
+ * comparison_free(). */
 NODISCARD bool compare_moments(const struct moments *a, const struct moments *b,
                                const struct compare_options *opt, struct comparison *out,
                                struct err *e);

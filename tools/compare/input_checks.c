@@ -40,8 +40,6 @@ static bool check_pixel(const struct moments *m, size_t p, bool exact, struct er
             return err_set(e, "pixel %d,%d is not a number", x, y);
         if (isinf(mean) || isinf(m2) || isinf(m3))
             return err_set(e, "pixel %d,%d is infinite", x, y);
-        if (mean < 0)
-            return err_set(e, "pixel %d,%d has negative radiance %g", x, y, mean);
         if (m2 < 0)
             return err_set(e, "pixel %d,%d has a negative sum of squares %g", x, y, m2);
         if (exact && m2 != 0)
