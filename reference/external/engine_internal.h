@@ -18,7 +18,7 @@ struct engine_job {
     int spp, replicates;
     bool half; /* some image had fewer than 32 bits */
     double cpu_s;
-    json_t *independence; /* with opt->check_independence: what the manifest gets; else NULL */
+    json_t *independence; /* what the manifest gets of "output": "mean" (independence_check()) */
 };
 
 /* Checks the features and writes the scene to paths[0], or a grey scene for each channel. For "dae" and "file" it only

@@ -137,9 +137,8 @@ static bool fold_runs(struct engine_job *j, struct moments *m, struct err *e)
     size_t pixels = (size_t)m->width * (size_t)m->height;
     struct replicate_repeats repeats;
     struct replicates seen = {0};
-    bool check = j->independence != NULL;
     bool ok = replicate_repeats_alloc(&repeats, j->replicates, e) &&
-              (!check || replicates_alloc(&seen, m->width, m->height, j->replicates, e));
+              replicates_alloc(&seen, m->width, m->height, j->replicates, e);
     if (j->en->shares_samples)
         seen.sharing = pixel_filter_sharing(&j->en->filter, 2);
     for (int k = 0; ok && k < j->replicates; k++) {
@@ -156,15 +155,14 @@ static bool fold_runs(struct engine_job *j, struct moments *m, struct err *e)
                     ? ", or less than RGBE's 8 bits show: write EXR or PFM"
                     : "");
         moments_add_image(m, px);
-        if (check)
-            replicates_add(&seen, px);
+        replicates_add(&seen, px);
         free(px);
     }
     if (ok && j->en->output == OUTPUT_NOISY)
         make_single(m, "picture", 3);
     else if (ok && (j->en->output == OUTPUT_EXACT || repeats.without_noise))
         make_single(m, "exact", 1);
-    else if (ok && check)
+    else if (ok)
         ok = independence_check(&seen, j->independence, e);
     replicates_free(&seen);
     replicate_repeats_free(&repeats);
@@ -234,7 +232,7 @@ bool engine_render(const struct engine *en, const struct suite_scene *scene,
     if (mkdtemp(dir.s) == NULL)
         return err_set(e, "%s: cannot make a directory in it: %s", work, strerror(errno));
     *manifest = NULL;
-    j.independence = opt->check_independence ? json_object() : NULL;
+    j.independence = json_object();
     bool rendered = engine_program(en, "command", j.program, sizeof j.program, e) &&
                     engine_write_scene(en, scene, dir.s, j.scene, e) && run_all(&j, out, e);
     bool ok = rendered && engine_describe(&j, out, progress_seconds() - start, manifest, e) &&

@@ -236,7 +236,8 @@ bool independence_check(const struct replicates *r, json_t *manifest, struct err
         return err_set(
             e,
             "pixels share their noise: sums over %d x %d pixels vary %.2g times as much as "
-            "independent pixels would, and intervals would be too narrow",
+            "independent pixels would, and intervals would be too narrow (a pixel filter wider than "
+            "declared, a denoiser, or random numbers that rows or tiles have in common?)",
             t.square_failed, t.square_failed, square_ratio(i, t.square_r[i]));
     }
     /* Reports the test that failed most clearly. */

@@ -140,6 +140,7 @@ END
 sed -i 's/"exr"/"pfm"/; s/64/16/' blurred/mine.json
 tell "replicates whose pixels share noise make no reference" "$(env -C blurred assay golden render --engine mine.json 2>&1 | grep -q 'cornell, mine: pixels share their noise' ||
     echo "no such line")"
+expect "nor are they judged against one" 3 "cornell, mine: pixels share their noise" env -C blurred assay validate -q
 
 # A pixel filter: a reference that was rendered under it is compared under it.
 cp -r begun tent && rm -r tent/golden

@@ -79,8 +79,7 @@ static bool make_described(void *ctx, const struct suite_scene *scene,
                                        .seed = c->opt.seed,
                                        .threads = c->opt.threads,
                                        .timeout_s = c->opt.timeout_s,
-                                       .work_dir = c->work,
-                                       .check_independence = true};
+                                       .work_dir = c->work};
     struct moments m;
     struct err why;
     json_t *manifest;

@@ -539,6 +539,44 @@ TEST(images_without_noise_are_exact)
     moments_free(&m);
 }
 
+/* Noise of its own for each pixel, or for each column: every row starts with the same seed. */
+static bool rows_share_a_seed;
+static float uniform(int pixel, int k)
+{
+    uint32_t x = (uint32_t)(rows_share_a_seed ? pixel % 16 : pixel) * 64 + (uint32_t)k;
+    return (float)replicate_seed(SEED, (int)x) / 2147483648.f;
+}
+
+/* A verdict takes pixels for independent, so it needs to know that they are. */
+TEST(replicates_whose_pixels_share_noise_are_an_error)
+{
+    struct suite_scene scene = point_plane;
+    scene.width = scene.height = 16;
+    for (int i = 0; i < 2; i++) {
+        OWN(engine) en;
+        OWN(moments) m = {0};
+        json_t *manifest;
+        struct err e = {0};
+        rows_share_a_seed = i == 1;
+        for (int k = 0; k < 8; k++) {
+            char name[64];
+            snprintf(name, sizeof name, "picture_%u.pfm", replicate_seed(SEED, k));
+            write_pfm(name, 16, 16, uniform, k);
+        }
+        engine_of_script("cp {here}/picture_$3.pfm $2", "", &en);
+        en.replicates = 8;
+        if (i == 1) {
+            REFUSES(render(&en, &scene, &m, &manifest, &e),
+                    "pixels share their noise: sums over 16 x 16");
+            continue;
+        }
+        MUST(render(&en, &scene, &m, &manifest, &e));
+        assert_true(
+            json_is_true(json_object_get(json_object_get(manifest, "independence"), "passed")));
+        json_decref(manifest);
+    }
+}
+
 TEST(programs_that_misbehave_are_errors)
 {
     write_pfm("ramp.pfm", W, H, ramp, 0);
