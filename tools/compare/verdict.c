@@ -207,7 +207,7 @@ void verdict_decide(struct comparison *c, const struct compare_options *opt,
 void verdict_more_samples(double factor, const char *of_what, char text[128])
 {
     if (factor < verdict_largest_factor)
-        snprintf(text, 128, "about %.1f times the %s would decide", factor, of_what);
+        snprintf(text, 128, "about %.1f times the %s would decide", fmax(factor, 1.1), of_what);
     else
         snprintf(
             text, 128,

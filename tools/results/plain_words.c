@@ -17,6 +17,13 @@ static int outside(const json_t *object, const char *key, double margin)
     return lo > margin ? 1 : hi < -margin ? -1 : 0;
 }
 
+static bool is_inside(const json_t *object, const char *key, double lo, double hi)
+{
+    const json_t *ci = json_object_get(object, key);
+    return ci != NULL && json_number_value(json_array_get(ci, 0)) >= lo &&
+           json_number_value(json_array_get(ci, 1)) <= hi;
+}
+
 /* "1.3 % too bright", or by a factor where per cent would be a large number. */
 static struct plain_words amount(double difference)
 {
@@ -46,26 +53,45 @@ struct plain_words plain_words_noise(const json_t *claim)
     return w;
 }
 
-static struct plain_words place(const json_t *region)
+/* " in the .. pixels at ..", or nothing where the region is the image: it begins at 0,0 and reaches into the last tile. */
+static struct plain_words place(const json_t *claim, const json_t *region)
 {
-    struct plain_words w;
-    snprintf(w.s, sizeof w.s, "in the %.0f x %.0f pixels at %.0f,%.0f",
-             member_number(region, "width"), member_number(region, "height"),
-             member_number(region, "x"), member_number(region, "y"));
+    struct plain_words w = {""};
+    const double x = member_number(region, "x"), y = member_number(region, "y"),
+                 width = member_number(region, "width"), height = member_number(region, "height"),
+                 tile = member_number(claim, "tile");
+    const bool is_image = x == 0 && y == 0 && tile > 0 &&
+                          width > tile * (member_number(claim, "tiles_x") - 1) &&
+                          height > tile * (member_number(claim, "tiles_y") - 1);
+    if (!is_image)
+        snprintf(w.s, sizeof w.s, " in the %.0f x %.0f pixels at %.0f,%.0f", width, height, x, y);
     return w;
+}
+
+/* Is the mean the same and the variance not known to be? */
+static bool only_the_variance_is_open(const json_t *claim)
+{
+    const double limit = 1 + member_number(claim, "margin_variance");
+    return limit > 1 &&
+           !is_inside(json_object_get(claim, "variance_ratio"), "ci", 1 / limit, limit) &&
+           is_inside(claim, "ci", -member_number(claim, "margin_global"),
+                     member_number(claim, "margin_global")) &&
+           is_inside(json_object_get(claim, "worst_tile"), "ci",
+                     -member_number(claim, "margin_tile"), member_number(claim, "margin_tile")) &&
+           !(member_number(claim, "extra_factor") > 1); /* judge_variance(): the mean is decided */
 }
 
 static struct plain_words too_bright(const json_t *claim)
 {
-    static const char *const channels[] = {"red ", "green ", "blue ", ""};
+    static const char *const channels[] = {" red", " green", " blue", ""};
     const json_t *tile = json_object_get(claim, "worst_tile"),
                  *worst = json_object_get(claim, "worst");
     if (outside(claim, "ci", member_number(claim, "margin_global")) != 0)
         return amount(member_number(claim, "difference"));
     struct plain_words w;
     if (outside(tile, "ci", member_number(claim, "margin_tile")) != 0) {
-        snprintf(w.s, sizeof w.s, "%.64s %.64s", amount(member_number(tile, "difference")).s,
-                 place(tile).s);
+        snprintf(w.s, sizeof w.s, "%.64s%.64s", amount(member_number(tile, "difference")).s,
+                 place(claim, tile).s);
         return w;
     }
     if (plain_words_noise(claim).s[0] != '\0')
@@ -73,10 +99,10 @@ static struct plain_words too_bright(const json_t *claim)
     const double difference = member_number(worst, "difference");
     const int channel = (int)member_number(worst, "channel");
     if (difference == 0 || member_number(worst, "width") == 0)
-        snprintf(w.s, sizeof w.s, "not the same, most of all %.64s", place(tile).s);
+        snprintf(w.s, sizeof w.s, "not the same, most of all%.64s", place(claim, tile).s);
     else
-        snprintf(w.s, sizeof w.s, "%.64s %s%.64s", amount(difference).s,
-                 channel >= 0 && channel < 3 ? channels[channel] : "", place(worst).s);
+        snprintf(w.s, sizeof w.s, "%.64s%s%.64s", amount(difference).s,
+                 channel >= 0 && channel < 3 ? channels[channel] : "", place(claim, worst).s);
     return w;
 }
 
@@ -137,6 +163,11 @@ struct plain_words plain_words_claim(const json_t *claim)
     else if (strcmp(verdict, "EQUIVALENT") == 0)
         snprintf(w.s, sizeof w.s, "%.100s is the same%.110s (as %.100s), within %.3g %%", a,
                  scene.s, b, 100 * member_number(claim, "margin_global"));
+    else if (strcmp(verdict, "INCONCLUSIVE") == 0 && only_the_variance_is_open(claim))
+        snprintf(w.s, sizeof w.s,
+                 "%.100s has the same mean%.110s (as %.100s), within %.3g %%, but its variance "
+                 "could not be judged",
+                 a, scene.s, b, 100 * member_number(claim, "margin_global"));
     else if (strcmp(verdict, "INCONCLUSIVE") == 0) {
         const struct plain_words more = plain_words_more_samples(claim);
         snprintf(w.s, sizeof w.s, "%.100s is too noisy to tell%.110s (against %.100s)%s%.200s", a,

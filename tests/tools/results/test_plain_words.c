@@ -39,6 +39,17 @@ TEST(who_how_much_and_where)
     assert_says(
         claim_of("DIFFERENT", "EQUIVALENT", 0, 0.011, 0.5, 0),
         "mine is 50.0 % too bright red in the 2 x 2 pixels at 32,16 on 12_point_plane (against truth)");
+    /* A region that is the image, of 64 x 48 pixels and 4 x 3 tiles, is no place. */
+    json_t *all = claim_of("DIFFERENT", "EQUIVALENT", 0, 0, -0.033, 2), *most_of_it;
+    json_object_update_new(all, json_pack("{si si si}", "tile", 16, "tiles_x", 4, "tiles_y", 3));
+    json_object_update_new(
+        json_object_get(all, "worst"),
+        json_pack("{sf sf sf sf}", "x", 0., "y", 0., "width", 64., "height", 48.));
+    most_of_it = json_deep_copy(all);
+    json_object_set_new(json_object_get(most_of_it, "worst"), "height", json_real(32));
+    assert_says(all, "mine is 3.3 % too dark blue on 12_point_plane (against truth)");
+    assert_says(most_of_it, "mine is 3.3 % too dark blue in the 64 x 32 pixels at 0,0 on "
+                            "12_point_plane (against truth)");
     assert_says(claim_of("EQUIVALENT", "DIFFERENT", 0, 0, 0, 3),
                 "mine is the same on 12_point_plane (as truth), within 0.2 %");
     assert_says(
@@ -74,6 +85,21 @@ TEST(how_noisy)
     json_object_set_new(c, "margin_variance", json_real(2));
     assert_string_equal(plain_words_noise(c).s, "");
     assert_null(strstr(plain_words_claim(c).s, "noisy"));
+}
+
+/* Variances that are too skewed to be compared have no interval. */
+TEST(a_mean_that_is_decided_is_not_too_noisy_to_tell)
+{
+    json_auto_t *c = claim_of("INCONCLUSIVE", "EQUIVALENT", 0, -0.001, 0.001, 3);
+    json_object_update_new(c, json_pack("{sf sf}", "margin_variance", 0.3, "extra_factor", 1.));
+    assert_string_equal(
+        plain_words_claim(c).s,
+        "mine has the same mean on 12_point_plane (as truth), within 0.2 %, but its "
+        "variance could not be judged");
+    json_object_set_new(c, "extra_factor", json_real(1.02));
+    assert_string_equal(plain_words_claim(c).s,
+                        "mine is too noisy to tell on 12_point_plane (against "
+                        "truth): about 1.1 times the samples would decide");
 }
 
 /* extra_factor 2.5 is of both sides. Where a share s of the variance is that of A, A alone needs s/(1/2.5 - (1 - s)) times
