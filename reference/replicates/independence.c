@@ -136,12 +136,16 @@ static void test_batches(const struct sums *s, struct independence *out)
     out->batches_z = z_of(s, w, 2 * sum);
 }
 
-static int block_side(const struct replicates *r)
+/* As large blocks as there are enough of, without those that are black. */
+static int add_all(struct sums *s, const struct replicates *r, double *e)
 {
-    int side = LARGEST_BLOCK;
-    while (side > 1 && (r->width / side) * (r->height / side) < FEWEST_BLOCKS)
-        side /= 2;
-    return side;
+    for (int side = LARGEST_BLOCK;; side /= 2) {
+        memset(s->g, 0, s->k * s->k * sizeof *s->g);
+        *s = (struct sums){.k = s->k, .g = s->g, .block = s->block};
+        add_blocks(s, r, side, e);
+        if (s->blocks >= FEWEST_BLOCKS || side == 1)
+            return side;
+    }
 }
 
 static double square_ratio(int i, double r)
@@ -175,16 +179,16 @@ static void judge(const struct sums *s, double alpha, double sharing, struct ind
 bool independence_test(const struct replicates *r, const struct shared_noise *shared, double alpha,
                        struct independence *out, struct err *e)
 {
-    size_t k = (size_t)r->num, side = (size_t)block_side(r);
-    *out = (struct independence){.passed = true, .replicates = r->num, .block = (int)side};
+    size_t k = (size_t)r->num;
+    *out = (struct independence){.passed = true, .replicates = r->num};
     if (k < FEWEST_REPLICATES)
         return true;
     struct sums s = {.k = k};
-    s.g = calloc((2 * k + side * side) * k, sizeof *s.g); /* one block for all */
+    s.g = calloc((2 * k + LARGEST_BLOCK * LARGEST_BLOCK) * k, sizeof *s.g); /* one block for all */
     if (s.g == NULL)
         return err_set(e, "independence of replicates: out of memory");
     s.block = s.g + k * k;
-    add_blocks(&s, r, (int)side, s.block + k * k);
+    out->block = add_all(&s, r, s.block + k * k);
     out->pixels = s.pixels;
     for (int i = 0; i < NUM_SQUARES; i++) {
         const struct square_noise *q = &shared->square[i < shared->num ? i : shared->num - 1];

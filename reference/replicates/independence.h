@@ -41,7 +41,7 @@
 
 enum { NUM_SQUARES = 4 };
 struct independence {
-    bool tested;    /* false: fewer than 4 replicates or 64 noisy blocks */
+    bool tested;    /* false: fewer than 4 replicates or 64 noisy pixels */
     bool passed;    /* true also where not tested */
     int replicates; /* K */
     int pixels;     /* N */

@@ -90,14 +90,31 @@ TEST(fewer_than_it_takes_is_said)
     struct independence t = test(&r, 1e-6);
     assert_false(t.tested);
     replicates_free(&r);
-    /* 63 noisy blocks of 1024 pixels: blocks are of 4 x 4 here, 64 of them. */
+    /* Of 1024 pixels the last 63 have noise. */
     r = draw_all(LAW_NORMAL, 8, false, &seed);
+    for (int k = 1; k < 8; k++)
+        memcpy(r.luminance + k * PIXELS, r.luminance, (PIXELS - 63) * sizeof(float));
+    t = test(&r, 1e-6);
+    assert_int_equal(t.pixels, 63);
+    assert_false(t.tested);
+    replicates_free(&r);
+}
+
+/* A scene with a black corner has 63 noisy blocks of 4 x 4, which are too few; of 2 x 2 it has 252. */
+TEST(what_is_black_does_not_keep_the_rest_from_being_tested)
+{
+    uint64_t seed = 6;
+    struct replicates r = draw_all(LAW_NORMAL, 8, false, &seed);
     for (int k = 1; k < 8; k++)
         for (int y = 0; y < 4; y++)
             memcpy(r.luminance + k * PIXELS + y * SIDE, r.luminance + y * SIDE, 4 * sizeof(float));
-    t = test(&r, 1e-6);
+    struct independence t = test(&r, 1e-6);
     assert_int_equal(t.pixels, PIXELS - 16);
-    assert_false(t.tested);
+    assert_true(t.tested && t.passed);
+    assert_int_equal(t.block, 2);
+    memcpy(r.luminance + 7 * PIXELS, r.luminance + 1 * PIXELS, PIXELS * sizeof *r.luminance);
+    t = test(&r, 1e-6);
+    assert_false(t.passed);
     replicates_free(&r);
 }
 
