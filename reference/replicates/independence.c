@@ -2,6 +2,7 @@
 
 #include <gsl/gsl_cdf.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -161,7 +162,24 @@ static void test_squares(struct independence *out, double sharing)
             out->square_failed = 2 << i;
 }
 
-static void judge(const struct sums *s, double alpha, double sharing, struct independence *out)
+/* Random numbers that all rows have in common add little to small squares, and much to columns. */
+static void test_groups(struct independence *out, const struct shared_noise *shared, double alpha,
+                        double sharing)
+{
+    for (int i = 0; i < shared->num_groups; i++) {
+        const struct square_noise *g = &shared->group[i];
+        if (g->ratio > out->group_ratio &&
+            shared_noise_exceeds(g, SQUARES_VARY_MOST * sharing,
+                                 log10(alpha / shared->num_groups))) {
+            out->group_failed = i;
+            out->group_side = g->side;
+            out->group_ratio = g->ratio;
+        }
+    }
+}
+
+static void judge(const struct sums *s, const struct shared_noise *shared, double alpha,
+                  double sharing, struct independence *out)
 {
     double pairs = (double)s->k * (double)(s->k - 1) / 2;
     test_pairs(s, out);
@@ -169,18 +187,20 @@ static void judge(const struct sums *s, double alpha, double sharing, struct ind
     test_batches(s, out);
     out->limit = sqrt(sharing) * gsl_cdf_ugaussian_Qinv(alpha / 4 / 2);
     out->pair_limit = sqrt(sharing) * gsl_cdf_ugaussian_Qinv(alpha / 4 / 2 / pairs);
-    out->square_limit = sqrt(sharing) * gsl_cdf_ugaussian_Qinv(alpha / 4 / NUM_SQUARES);
+    out->square_limit = sqrt(sharing) * gsl_cdf_ugaussian_Qinv(alpha / 4 / 2 / NUM_SQUARES);
     test_squares(out, sharing);
+    test_groups(out, shared, alpha / 4 / 2, sharing);
     out->tested = true;
     out->passed = fabs(out->pair_z) <= out->pair_limit && fabs(out->neighbours_z) <= out->limit &&
-                  fabs(out->batches_z) <= out->limit && out->square_failed == 0;
+                  fabs(out->batches_z) <= out->limit && out->square_failed == 0 &&
+                  out->group_failed < 0;
 }
 
 bool independence_test(const struct replicates *r, const struct shared_noise *shared, double alpha,
                        struct independence *out, struct err *e)
 {
     size_t k = (size_t)r->num;
-    *out = (struct independence){.passed = true, .replicates = r->num};
+    *out = (struct independence){.passed = true, .replicates = r->num, .group_failed = -1};
     if (k < FEWEST_REPLICATES)
         return true;
     struct sums s = {.k = k};
@@ -196,7 +216,7 @@ bool independence_test(const struct replicates *r, const struct shared_noise *sh
         out->square_se[i] = q->se;
     }
     if (s.blocks >= FEWEST_BLOCKS)
-        judge(&s, alpha, fmax(r->sharing, 1), out);
+        judge(&s, shared, alpha, fmax(r->sharing, 1), out);
     free(s.g);
     return true;
 }
@@ -233,16 +253,25 @@ bool independence_check(const struct replicates *r, json_t *manifest, struct err
     json_object_set_new(manifest, "independence", to_json(&t));
     if (t.passed)
         return true;
-    if (t.square_failed > 0) {
-        int i = 0;
-        while (2 << i < t.square_failed)
-            i++;
+    if (t.square_failed > 0 || t.group_failed >= 0) {
+        char sums[64];
+        double ratio = t.group_ratio;
+        if (t.square_failed > 0) {
+            int i = 0;
+            while (2 << i < t.square_failed)
+                i++;
+            ratio = square_ratio(i, t.square_r[i]);
+            snprintf(sums, sizeof sums, "%d x %d pixels", t.square_failed, t.square_failed);
+        } else if (t.group_side == 0)
+            snprintf(sums, sizeof sums, "two %s", t.group_failed == 0 ? "rows" : "columns");
+        else
+            snprintf(sums, sizeof sums, "one place in tiles of %d", t.group_side);
         return err_set(
             e,
-            "pixels share their noise: sums over %d x %d pixels vary %.2g times as much as "
+            "pixels share their noise: sums over %s vary %.2g times as much as "
             "independent pixels would, and intervals would be too narrow (a pixel filter wider than "
             "declared, a denoiser, or random numbers that rows or tiles have in common?)",
-            t.square_failed, t.square_failed, square_ratio(i, t.square_r[i]));
+            sums, ratio);
     }
     /* Reports the test that failed most clearly. */
     double pair = fabs(t.pair_z) / t.pair_limit, neighbours = fabs(t.neighbours_z) / t.limit,

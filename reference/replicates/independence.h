@@ -18,8 +18,9 @@
  *   pair        the largest |z| of a single r, over K (K-1)/2 pairs: finds a copy or a seed used twice
  *   neighbours  the mean r of replicates k, k+1: finds seeds that are too close to each other
  *   batches     B Var(mean of B successive replicates) / Var, B near sqrt K; 1 under H0: finds slow drifts
- *   pixels      H0: the variance between replicates of the sum over a square of side 2, 4, 8 or 16 is at most
- *               SQUARES_VARY_MOST times the sum of its pixels' variances. Independent replicates may violate
+ *   pixels      H0: the variance between replicates of the sum over a square of side 2, 4, 8 or 16, over two rows or
+ *               columns, or over one place in tiles that repeat, is at most SQUARES_VARY_MOST times the
+ *               sum of its pixels' variances. Half of this alpha is for squares. Independent replicates may violate
  *               it, but compare_moments() assumes independent pixels: its intervals would then be too narrow,
  *               and the tests above, which assume independent blocks, would be off, too.
  * If a known filter makes pixels share samples ("sharing"), squares may vary by that factor more, and limits of |z|
@@ -58,6 +59,9 @@ struct independence {
      * independence; the ratio of variances is 1 + (pixels in it - 1) x that. */
     double square_r[NUM_SQUARES], square_se[NUM_SQUARES];
     int square_failed; /* side of the square whose ratio is shown to be too large; 0: none */
+    /* The group (shared_noise.h) that shows this most, its ratio and its tile's side; -1: none */
+    int group_failed, group_side;
+    double group_ratio;
 };
 
 /* shared: what their pixels share (shared_noise_measure()); not read of fewer than 4. False only out of memory. */

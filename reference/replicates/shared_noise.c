@@ -152,7 +152,7 @@ static double at_most(const struct square_noise *q)
     return q->ratio * (1 + 3 * sqrt(2 / q->dof));
 }
 
-static bool exceeds(const struct square_noise *q, double ratio, double log10_p)
+bool shared_noise_exceeds(const struct square_noise *q, double ratio, double log10_p)
 {
     return log10_tail(q->dof * q->ratio / ratio, q->dof) <= log10_p;
 }
@@ -163,7 +163,7 @@ static double of_groups(const struct shared_noise *s, int side, double level)
     double lines = 1, tiles = 1;
     for (int i = 0; i < s->num_groups; i++) {
         const struct square_noise *g = &s->group[i];
-        if (!exceeds(g, 1, level))
+        if (!shared_noise_exceeds(g, 1, level))
             continue;
         if (i < 2)
             lines += (at_most(g) - 1) * fmin(1, (double)side / (i == 0 ? s->width : s->height));
@@ -195,7 +195,7 @@ static double of_squares(const struct shared_noise *s, double level,
         *unlimited = largest;
     /* What the largest squares would show if that were all; as sharing is shown, sqrt(alpha) is rare enough. */
     for (const struct square_noise *q = largest + 1; q < s->square + s->num; q++)
-        if (exceeds(q, factor, level / 2))
+        if (shared_noise_exceeds(q, factor, level / 2))
             *unlimited = q;
     return factor;
 }
@@ -209,13 +209,13 @@ double shared_noise_factor(const struct shared_noise *s, double alpha,
     *unlimited = NULL;
     for (int i = 0; i < s->num; i++) {
         const struct square_noise *q = &s->square[i];
-        explained = explained && !exceeds(q, of_groups(s, q->side, level), level / 2);
+        explained = explained && !shared_noise_exceeds(q, of_groups(s, q->side, level), level / 2);
     }
     if (explained)
         return groups;
     double factor = of_squares(s, level, unlimited);
     for (int i = 0; i < s->num_groups; i++)
-        if (exceeds(&s->group[i], factor, level))
+        if (shared_noise_exceeds(&s->group[i], factor, level))
             factor = fmax(factor, groups);
     return factor;
 }

@@ -31,6 +31,9 @@ struct shared_noise {
 NODISCARD bool shared_noise_measure(const struct replicates *r, struct shared_noise *out,
                                     struct err *e);
 
+/* Is it shown, with a p of 10^log10_p, that sums over these vary more than `ratio` times as much as independent pixels? */
+bool shared_noise_exceeds(const struct square_noise *q, double ratio, double log10_p);
+
 /* By how much the variance of large sums exceeds that of independent pixels; 1 unless squares of a size, or a group, show
  * more with a p of at most alpha over their number. It is extrapolated from the largest squares of which there are enough (a
  * fixed reach leaves out a part of the sum that falls as 1/side), plus three standard errors of their ratio.

@@ -238,6 +238,36 @@ TEST(pixels_that_share_noise_are_refused)
     }
 }
 
+/* Random numbers that rows have in common: one for each column, with 6 % of the variance of its pixels, so that two of
+ * them have the correlation 0.06/1.06. Sums over columns vary 1 + 31 x 0.057 = 2.8 times too much (two columns, 48
+ * replicates: one standard error is 2.8 sqrt(2/(16 x 47)) = 0.14), squares of 16 only 1 + 15 x 0.057 = 1.9 times, which is
+ * not shown to be more than 1.5. The same for rows, and for each place in 16 tiles of 8 x 8, with 12 %: 1 + 15 x 0.107 = 2.6. */
+TEST(lines_and_tiles_that_share_noise_are_refused)
+{
+    static const char *const said[3] = {"sums over two columns vary 2.",
+                                        "sums over two rows vary 2.",
+                                        "sums over one place in tiles of 8 vary 2."};
+    uint64_t seed = 29;
+    for (int kind = 0; kind < 3; kind++) {
+        struct replicates r = draw_all(LAW_NORMAL, 48, false, &seed);
+        for (int k = 0; k < r.num; k++) {
+            double g[PIXELS];
+            for (int i = 0; i < PIXELS; i++)
+                g[i] = sqrt(kind < 2 ? 0.06 : 0.12) * (draw(LAW_NORMAL, &seed) - 1);
+            for (int p = 0; p < PIXELS; p++) {
+                const int x = p % SIDE, y = p / SIDE,
+                          group = kind == 0   ? x
+                                  : kind == 1 ? y
+                                              : y % 8 * 8 + x % 8;
+                r.luminance[k * PIXELS + p] += (float)(g[group] * (1 + p % 7));
+            }
+        }
+        assert_int_equal(test(&r, 1e-6).square_failed, 0);
+        assert_refused(&r, said[kind]);
+        replicates_free(&r);
+    }
+}
+
 /* Samples on a grid of 4 x 4 a pixel, each counted by all pixels whose tent of radius 1 reaches it,
  * as programs splat. */
 static struct replicates splat_all(int count, double sharing, uint64_t *state)
