@@ -68,7 +68,8 @@ NODISCARD bool engine_expresses(const struct engine *en, const struct suite_scen
  * plus "description_sha256" and "files" (the hash of each file of {here} that the command names). "mean": K runs with
  * different seeds, folded. Fails, with the program's last lines, if it is missing, dies, hangs or writes no image, an
  * image of another size, without R, G and B, with pixels that are not finite, or the same image for two seeds (unless
- * that image has no noise at all: then it is "exact"), or replicates that fail independence_check(). Its files are then kept, and the line names their directory. */
+ * that image has no noise at all: then it is "exact"), or if replicates fail independence_check(). Its files are then
+ * kept, and the line names their directory. */
 NODISCARD bool engine_render(const struct engine *en, const struct suite_scene *scene,
                              const struct engine_options *opt, struct moments *out,
                              json_t **manifest, struct err *e);
