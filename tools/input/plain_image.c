@@ -36,7 +36,7 @@ static struct bin bin_of(const struct image_file *pic, const struct curve *curve
         int steps = pic->info.type == IMAGE_INT8 ? 255 : 65535, k = (int)lround((double)v * steps);
         double lo, hi;
         tone_curve_bin(curve, k, steps, &lo, &hi);
-        b = (struct bin){(lo + hi) / 2, hi - lo, (hi - lo) / 2, k == 0 || k == steps};
+        b = (struct bin){(lo + hi) / 2, hi - lo, (hi - lo) / 2, k == steps};
         break;
     }
     case IMAGE_HALF: /* 11 bits, to the nearest; 2^-24 is the smallest step */

@@ -385,7 +385,9 @@ TEST(test_codes)
     assert_near(in.m.mean[0], 1000 * step, 1e-9);
     assert_near(in.m.tolerance[0], step / 2, 1e-12);
     assert_near(in.rounding[0], step * step / 12, 1e-18);
-    assert_true(!in.censored[0] && in.censored[1]);
+    assert_true(!in.censored[0] && !in.censored[1]);
+    assert_near(in.m.mean[3], step / 4, 1e-12); /* code 0: from 0 to half a code */
+    assert_near(in.m.tolerance[3], step / 4, 1e-12);
     input_free(&in);
     odd_png(test_path("grey.png"), 3, 1, 1, 8, (uint16_t[3]){51, 255, 254});
     in = read_side(test_path("grey.png"), opt, &notes);
@@ -532,6 +534,18 @@ TEST(test_censored)
     odd_png(pb, 64, 64, 3, 8, b);
     assert_int_equal(compare_files(pa, pb, opt, &notes, &censored), VERDICT_EQUIVALENT);
     assert_int_equal(censored, 0);
+    /* A black background is known as well as anything else: up to half a code. */
+    const struct compare_options no_margin = {.alpha = 1e-3, .tile = 16};
+    for (int i = 3 * 64 * 32; i < 3 * 64 * 64; i++)
+        a[i] = b[i] = 0;
+    odd_png(pa, 64, 64, 3, 8, a);
+    odd_png(pb, 64, 64, 3, 8, b);
+    assert_int_equal(compare_files(pa, pb, no_margin, &notes, &censored), VERDICT_NOTHING_FOUND);
+    assert_int_equal(censored, 0);
+    fill_codes(a + 3 * 64 * 32, 32, &seed);
+    fill_codes(b + 3 * 64 * 32, 32, &seed);
+    fill_codes(a + 3 * 64 * 48, 32, &seed);
+    fill_codes(b + 3 * 64 * 48, 32, &seed);
     for (int y = 0; y < 12; y++)
         for (int x = 0; x < 12; x++)
             for (int c = 0; c < 3; c++) {
@@ -543,9 +557,9 @@ TEST(test_censored)
     assert_int_equal(compare_files(pa, pb, opt, &notes, &censored), VERDICT_INCONCLUSIVE);
     assert_int_equal(censored, 144);
     assert_true(has_note(&notes, "144 of 4096"));
-    /* Spread over the tiles: 128 more at 0, 272 are 6.6 %. */
+    /* Spread over the tiles: 128 more, 272 are 6.6 %. */
     for (int i = 0; i < 128; i++)
-        b[3 * (64 * 20 + 17 * i % (64 * 40)) + 1] = 0;
+        b[3 * (64 * 20 + 17 * i % (64 * 40)) + 1] = 255;
     odd_png(pb, 64, 64, 3, 8, b);
     assert_int_equal(compare_files(pa, pb, opt, &notes, &censored), VERDICT_INCONCLUSIVE);
     assert_int_equal(censored, 144 + 128);
