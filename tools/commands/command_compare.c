@@ -19,7 +19,7 @@ static const char usage[] =
     "  a directory of at least 3 replicates: float EXR or PFM, each with a different seed\n"
     "  an EXR of Mitsuba 3's moment integrator, or NAME.exr with NAME_var.exr (give --spp-a, --spp-b)\n"
     "  an image without moments: EXR, HDR, PFM; noise is estimated from neighbouring pixels of A - B\n"
-    "  a PNG of 8 or 16 bits (give --curve)\n"
+    "  a PNG or PPM of 8 or 16 bits (give --curve)\n"
     "Any assumptions made about them are printed with the verdict. Procedure:\n"
     "tools/docs/background/verdict.md.\n";
 
@@ -94,7 +94,7 @@ static const struct cli_option options[] = {
      "the image)",
      TO(job.min_side), 1, 65536},
     {0, "curve", "CURVE",
-     "encoding curve of PNG files (radiance to code): srgb, linear,\n"
+     "encoding curve of PNG and PPM files (radiance to code): srgb, linear,\n"
      "gamma=G (G in 0.2 to 5), or cgl, the assignment's",
      .read = read_curve},
     {0, "spp-a", "N",

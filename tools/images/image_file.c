@@ -1,8 +1,45 @@
 #include "image_file.h"
 
+#include "renderer/base/fs.h"
+
+#include <ctype.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+/* The third number of a PPM's or PGM's header, the brightest code; 0 if it has none. */
+static int brightest_code(const char *path)
+{
+    int number[3] = {0}, digits = 0, num = 0, c;
+    FILE *f = fs_open(path);
+    if (f == NULL || fgetc(f) != 'P' || fgetc(f) == EOF)
+        num = 3;
+    while (num < 3 && (c = fgetc(f)) != EOF) {
+        if (isdigit(c) && digits < 6) {
+            number[num] = 10 * number[num] + c - '0';
+            digits++;
+            continue;
+        }
+        num += digits > 0;
+        digits = 0;
+        while (c == '#' && (c = fgetc(f)) != '\n')
+            c = c == EOF ? EOF : '#';
+        if (c != EOF && !isspace(c))
+            break;
+    }
+    if (f != NULL)
+        fclose(f);
+    return num == 3 ? number[2] : 0;
+}
+
+/* Codes up to another number than 255 or 65535 are spread over these when they are read, so that nothing would tell how
+ * coarse they were. */
+static bool has_all_codes(const char *path, const struct image_info *info)
+{
+    const int brightest = brightest_code(path);
+    return brightest == (info->type == IMAGE_INT8 ? 255 : 65535);
+}
 
 static bool check_file(const char *path, const struct image_info *info, struct err *e)
 {
@@ -12,10 +49,15 @@ static bool check_file(const char *path, const struct image_info *info, struct e
                  ((strcmp(info->format, "openexr") == 0 || strcmp(info->format, "hdr") == 0 ||
                    strcmp(info->format, "pnm") == 0) &&
                   is_float);
+    if (strcmp(info->format, "pnm") == 0 && integer) {
+        if (!has_all_codes(path, info))
+            return err_set(e, "%s: the brightest code of a PPM must be 255 or 65535", path);
+        known = true;
+    }
     if (!known)
         return err_set(e,
-                       "%s: an image to compare is an EXR, HDR or PFM of floats or a PNG of 8 or "
-                       "16 bits, this is %s",
+                       "%s: an image to compare is an EXR, HDR or PFM of floats or a PNG or PPM of "
+                       "8 or 16 bits, this is %s",
                        path, info->format);
     if (info->parts > 1)
         return err_set(e, "%s: has %d images in one file, which of them?", path, info->parts);

@@ -13,7 +13,7 @@ struct image_file {
     double spp;    /* paths per pixel, mean over the image, of a moments EXR; else 0, not known */
 };
 
-/* EXR, HDR (RGBE), PFM, and PNG of 8 or 16 bits. Channels R, G, B, or Y alone for all three; A only
+/* EXR, HDR (RGBE), PFM, and PNG or PPM of 8 or 16 bits. Channels R, G, B, or Y alone for all three; A only
  * where it is 1 everywhere. An EXR whose data and display windows differ is the image shown (image_uncrop()).
  * Fails on other formats and channels, on a rotated or otherwise cropped image, on
  * several images in one file, on NaN and infinity. The caller frees with image_file_free(). */

@@ -231,11 +231,12 @@ static bool censor(struct input *a, struct input *b, struct notes *notes, struct
     a->num_censored = b->num_censored = num;
     if (num == pixels)
         return err_set(e, "every pixel is saturated in one of the images");
-    input_notes_add(
-        notes,
-        "saturated: %zu of %zu pixels (%.2g %%) have the brightest code in an image; they are in "
-        "no sum and nothing is said of them. Regions around them are measured by what is left",
-        num, pixels, 100 * (double)num / (double)pixels);
+    if (num > 0)
+        input_notes_add(
+            notes,
+            "saturated: %zu of %zu pixels (%.2g %%) have the brightest code in an image; they are in "
+            "no sum and nothing is said of them. Regions around them are measured by what is left",
+            num, pixels, 100 * (double)num / (double)pixels);
     return true;
 }
 

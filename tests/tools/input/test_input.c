@@ -403,6 +403,21 @@ TEST(test_codes)
     odd_png(test_path("opaque.png"), 1, 1, 4, 8, (uint16_t[4]){9, 9, 9, 255});
     in = read_side(test_path("opaque.png"), opt, &notes);
     input_free(&in);
+    /* PPM, as text and as bytes ("3f" is 51, 102, 153), from the top down; coarser codes are refused. */
+    static const char *const ppm[] = {"P3\n# by a tracer\n1 2 255\n51 102 153\n255 254 0\n",
+                                      "P6 1 2\n#\n255\n3f\x99\xff\xfe\x01"};
+    for (int i = 0; i < 2; i++) {
+        odd_file(test_path("two.ppm"), ppm[i]);
+        in = read_side(test_path("two.ppm"), opt, &notes);
+        for (int c = 0; c < 3; c++)
+            assert_near(in.m.mean[c], 0.2 * (c + 1), 1e-7);
+        assert_true(!in.censored[0] && in.censored[1]);
+        input_free(&in);
+    }
+    odd_file(test_path("coarse.ppm"), "P3 1 1 31\n1 2 31\n");
+    assert_refused(test_path("coarse.ppm"), opt, "brightest code of a PPM must be 255 or 65535");
+    odd_file(test_path("short.ppm"), "P3 1 1");
+    assert_refused(test_path("short.ppm"), opt, "short.ppm: ");
 }
 
 /* Half floats: 1.5 has 10 binary digits behind the point, so that half a step is 2^-11 of 2^0 <= v < 2^1;
