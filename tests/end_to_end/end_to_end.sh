@@ -371,7 +371,9 @@ expect "compare: the same program, again" 3 "nor --again nor --paired" \
 expect "compare: a filter for nothing" 3 "is for --same-program" \
     "$san_assay" compare --filter-width 3 "$tmp/one.exr" "$tmp/two.exr"
 expect "compare: PNG against moments" 1 "is not used" \
-    "$san_assay" compare --curve srgb "$tmp/shallow.png" "$tmp/two.exr"
+    "$san_assay" compare --curve srgb --filter-width 1 "$tmp/shallow.png" "$tmp/two.exr"
+expect "compare: independent pixels, said of nothing" 3 "whose noise is not known" \
+    "$san_assay" compare --filter-width 1 "$tmp/one.exr" "$tmp/two.exr"
 expect "compare: the same PNG" 3 "the same image" \
     "$san_assay" compare --curve srgb "$tmp/one.png" "$tmp/one.png"
 expect "compare: a curve for nothing" 3 "neither" \

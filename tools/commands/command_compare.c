@@ -87,7 +87,9 @@ static const struct cli_option options[] = {
     {0, "filter-width", "N",
      "for --same-program: pixels closer than N may share noise, as with a\n"
      "pixel filter N wide; only one in N x N is tested (all; if they\n"
-     "seem to share noise: INCONCLUSIVE)",
+     "seem to share noise: INCONCLUSIVE). 1, also for images without\n"
+     "moments: each pixel has samples of its own, so that what larger\n"
+     "squares show is no noise",
      TO(job.filter_width), 1, 1000},
     {0, "min-side", "N",
      "side of the smallest region of --exchangeable, pixels (about 1/32 of\n"

@@ -2,6 +2,7 @@
 
 #include "tools/stats/distributions.h"
 
+#include <gsl/gsl_poly.h>
 #include <math.h>
 #include <stdio.h>
 
@@ -206,9 +207,24 @@ static double skew_of_p(const struct judge *j, const struct measured *m)
     return is_unskewed(j, m) ? 0 : fmax(m->skew, m->skew_around);
 }
 
+/* Where the raised p of t is least. Far out ln p of t falls by (dof + 1) t/(dof + t^2), and that of the factor grows by
+ * skew t^2, which is more in the end. */
+static double t_of_least_p(double dof, double skew)
+{
+    double root[3];
+    if (!(skew > 0) || isinf(dof))
+        return INFINITY;
+    gsl_poly_solve_cubic(0, dof, -(dof + 1) / skew, &root[0], &root[1], &root[2]);
+    return root[0];
+}
+
+/* A larger t is no likelier than a smaller one, so that it has the least p of these. */
 static double raised_log10_p(const struct measured *m, double t, double skew)
 {
+    const double least = fmin(t, t_of_least_p(m->dof, skew));
     double log10_p = stats_t_log10_p(t, m->dof) + skew_at(skew, t) / log(10);
+    if (least < t)
+        log10_p = fmin(log10_p, stats_t_log10_p(least, m->dof) + skew_at(skew, least) / log(10));
     return fmin(0, fmax(region_smallest_log10_p, log10_p));
 }
 
@@ -232,8 +248,14 @@ double region_missed_z(const struct judge *j, const struct measured *m, int chan
 
 double region_rank(const struct judge *j, const struct measured *m)
 {
-    double t = fmax(0, region_excess_t(m)), z = stats_z_of_t(t, m->dof);
-    return sqrt(fmax(0, z * z - 2 * skew_at(skew_of_p(j, m), t)));
+    const double skew = skew_of_p(j, m), far = fmax(0, region_excess_t(m)),
+                 t[2] = {far, fmin(far, t_of_least_p(m->dof, skew))};
+    double rank = 0;
+    for (int i = 0; i < (t[1] < far ? 2 : 1); i++) {
+        const double z = stats_z_of_t(t[i], m->dof);
+        rank = fmax(rank, z * z - 2 * skew_at(skew, t[i]));
+    }
+    return sqrt(rank);
 }
 
 double region_log10_p_equal(const struct judge *j, const struct measured *m, int channel)

@@ -240,24 +240,28 @@ static bool censor(struct input *a, struct input *b, struct notes *notes, struct
     return true;
 }
 
-static bool pair_images(struct input *a, struct input *b, struct notes *notes, struct err *e)
+static bool pair_images(struct input *a, struct input *b, bool independent, struct notes *notes,
+                        struct err *e)
 {
     struct noise_estimate s;
     if (a->kind != INPUT_IMAGE || b->kind != INPUT_IMAGE)
         input_notes_add(notes, "the variance that %c has is not used: the other side has none",
                         a->kind == INPUT_IMAGE ? 'B' : 'A');
-    if (!noise_estimate_variance(&a->m, &b->m, a->rounding, b->rounding, a->censored, &s, e))
+    if (!noise_estimate_variance(&a->m, &b->m, a->rounding, b->rounding, a->censored, independent,
+                                 &s, e))
         return false;
     a->is_guessed = b->is_guessed = true;
     input_notes_add(
         notes, "approximate: without moments, the noise is taken from second differences of A - B "
                "in blocks of 8 x 8 pixels (1/6 degree of freedom a pixel); an error as fine as a "
                "pixel or two counts as noise and is missed");
-    input_notes_add(
-        notes,
-        "pixels share noise: means of squares, or of lines, have %.2f, %.2f, %.2f times the variance "
-        "(R, G, B) that independent pixels of the same second differences have; this is allowed for",
-        s.factor[0], s.factor[1], s.factor[2]);
+    if (!independent)
+        input_notes_add(
+            notes,
+            "pixels share noise, or differ: means of squares, or of lines, have %.2f, %.2f, %.2f times the variance "
+            "(R, G, B) that independent pixels of the same second differences have. It is taken for noise; "
+            "--filter-width 1 says that each pixel has samples of its own",
+            s.factor[0], s.factor[1], s.factor[2]);
     input_notes_add(
         notes,
         "skewness of A - B in one pixel: %+.2f, %+.2f, %+.2f (+-%.2f, %.2f, %.2f); unequal "
@@ -302,7 +306,8 @@ static bool allow_for_sharing(struct input *in, char side, struct notes *notes, 
     return true;
 }
 
-bool input_pair(struct input *a, struct input *b, struct notes *notes, struct err *e)
+bool input_pair(struct input *a, struct input *b, bool independent, struct notes *notes,
+                struct err *e)
 {
     if (a->m.width != b->m.width || a->m.height != b->m.height)
         return err_set(e, "A is %d x %d pixels, B is %d x %d", a->m.width, a->m.height, b->m.width,
@@ -321,7 +326,7 @@ bool input_pair(struct input *a, struct input *b, struct notes *notes, struct er
     if (!censor(a, b, notes, e))
         return false;
     if (a->kind == INPUT_IMAGE || b->kind == INPUT_IMAGE)
-        return pair_images(a, b, notes, e);
+        return pair_images(a, b, independent, notes, e);
     if (!allow_for_sharing(a, 'A', notes, e) || !allow_for_sharing(b, 'B', notes, e))
         return false;
     bool lacks_a = a->kind == INPUT_VARIANCE, lacks_b = b->kind == INPUT_VARIANCE;

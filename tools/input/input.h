@@ -68,7 +68,8 @@ void input_free(struct input *in);
  * noise in both, bounds skewness where it is not known, allows for noise that pixels of replicates share, and
  * estimates the variance from the images themselves if one of them has none. Fails on replicates that share noise
  * over more pixels than can be allowed for. */
-NODISCARD bool input_pair(struct input *a, struct input *b, struct notes *notes, struct err *e);
+NODISCARD bool input_pair(struct input *a, struct input *b, bool independent, struct notes *notes,
+                          struct err *e);
 
 /* After compare_moments() on a pair: EQUIVALENT and NO DIFFERENCE FOUND become INCONCLUSIVE, with the reason, if more than
  * 5 % of the image or half of a reporting tile is censored; in the latter case nothing is detectable

@@ -87,7 +87,8 @@ struct assay_options {
     bool exchangeable; /* an exact test by permutation of replicates, without margins */
     bool
         same_program; /* two versions of one program, equally many samples: an exact test by flips of pixels */
-    int filter_width; /* same_program: pixels nearer than this may share noise; 0: is tested */
+    int filter_width; /* same_program: pixels nearer than this may share noise; 0: is tested. 1: pixels of images without
+                         moments share none, either */
     int min_side;     /* exchangeable: least side of a region, pixels; 0: about 1/32 of the image */
 };
 /* The defaults. size: sizeof of the struct that the caller was compiled with. */

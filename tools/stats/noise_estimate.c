@@ -367,7 +367,7 @@ static void set_channel(struct moments *a, struct moments *b, int c, const struc
 
 static bool one_channel(struct moments *a, struct moments *b, int c, struct grid *d,
                         const double *more_a, const double *more_b, const unsigned char *censored,
-                        struct noise_estimate *out, struct err *e)
+                        bool independent, struct noise_estimate *out, struct err *e)
 {
     size_t pixels = (size_t)d->width * (size_t)d->height;
     for (size_t p = 0; p < pixels; p++) {
@@ -376,7 +376,8 @@ static bool one_channel(struct moments *a, struct moments *b, int c, struct grid
     }
     struct blocks g;
     double bound = 1;
-    bool ok = blocks_make(d, &g, e) && level(d, &g, &out->factor[c], &bound, e);
+    out->factor[c] = 1;
+    bool ok = blocks_make(d, &g, e) && (independent || level(d, &g, &out->factor[c], &bound, e));
     if (ok) {
         skewness(&g, &out->skewness[c], &out->skew_error[c]);
         double skew = out->skewness[c] + copysign(out->skew_error[c], out->skewness[c]);
@@ -387,7 +388,7 @@ static bool one_channel(struct moments *a, struct moments *b, int c, struct grid
 }
 
 bool noise_estimate_variance(struct moments *a, struct moments *b, const double *more_a,
-                             const double *more_b, const unsigned char *censored,
+                             const double *more_b, const unsigned char *censored, bool independent,
                              struct noise_estimate *out, struct err *e)
 {
     size_t pixels = (size_t)a->width * (size_t)a->height;
@@ -406,7 +407,7 @@ bool noise_estimate_variance(struct moments *a, struct moments *b, const double 
         return false;
     bool ok = true;
     for (int c = 0; ok && c < 3; c++)
-        ok = one_channel(a, b, c, &d, more_a, more_b, censored, out, e);
+        ok = one_channel(a, b, c, &d, more_a, more_b, censored, independent, out, e);
     free(d.v);
     for (size_t p = 0; p < pixels; p++)
         a->n[p] = b->n[p] = 3;

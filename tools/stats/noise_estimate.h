@@ -36,10 +36,11 @@ struct noise_estimate {
 /* Sets n, M2 and M3 of both from their means, in units "picture": half of the variance to each side,
  * written as 3 observations so that the comparison finds the variance, the degrees of freedom and
  * the skewness above; n is no count of anything. more_a, more_b (3 per pixel, or NULL): further
- * variance of that side. Pixels with censored[p] != 0 are ignored and get no noise. Fails with a
- * line where the images are the same, smaller than 32 x 32, or too much is censored. */
+ * variance of that side. Pixels with censored[p] != 0 are ignored and get no noise. independent: pixels are known to
+ * share no noise, so that all that larger squares show is a difference. Fails with a line where the images are the
+ * same, smaller than 32 x 32, or too much is censored. */
 NODISCARD bool noise_estimate_variance(struct moments *a, struct moments *b, const double *more_a,
                                        const double *more_b, const unsigned char *censored,
-                                       struct noise_estimate *out, struct err *e);
+                                       bool independent, struct noise_estimate *out, struct err *e);
 
 #endif

@@ -25,7 +25,7 @@ bool pair_noise_estimate(const struct moments *a, const struct moments *b, struc
         memcpy(out[k].mean, of[k]->mean, values * sizeof *out[k].mean);
     }
     if (memcmp(a->mean, b->mean, values * sizeof *a->mean) != 0)
-        return noise_estimate_variance(&out[0], &out[1], NULL, NULL, NULL, &found, e);
+        return noise_estimate_variance(&out[0], &out[1], NULL, NULL, NULL, false, &found, e);
     for (int k = 0; k < 2; k++) {
         strcpy(out[k].unit, "exact");
         for (size_t i = 0; i < values / 3; i++)

@@ -44,8 +44,9 @@ bool compare_job_check(struct compare_job *job, struct err *e)
     if (job->same_program && (job->exchangeable || job->paired || job->again[0] != NULL))
         return err_set(e, "--same-program is exact from one pair of renders with seeds of their "
                           "own: it takes neither --exchangeable nor --again nor --paired");
-    if (!job->same_program && job->filter_width > 0)
-        return err_set(e, "--filter-width is for --same-program");
+    if (!job->same_program && job->filter_width > 1)
+        return err_set(e, "--filter-width %d is for --same-program; other images can only have 1",
+                       job->filter_width);
     if (!job->exchangeable && job->min_side > 0)
         return err_set(e, "--min-side is for --exchangeable");
     return true;
@@ -131,7 +132,11 @@ static bool pair_read(const struct compare_job *job, const char *const path[2],
                      path[1]);
     if (ok && job->paired)
         make_pairs(p, notes);
-    ok = ok && input_pair(&p->in[0], &p->in[1], notes, e);
+    const bool independent = job->filter_width == 1;
+    ok = ok && input_pair(&p->in[0], &p->in[1], independent, notes, e) &&
+         (!independent || job->same_program || p->in[0].is_guessed ||
+          err_set(e,
+                  "--filter-width is for --same-program and for images whose noise is not known"));
     if (!ok)
         pair_free(p);
     return ok;

@@ -156,7 +156,7 @@ static bool compare_shared(int side, bool naive, uint64_t *seed, enum verdict *v
     }
     struct comparison c;
     const struct compare_options opt = {.alpha = 0.05, .tile = 16, .threads = 1};
-    bool ok = input_pair(&in[0], &in[1], &notes, why) &&
+    bool ok = input_pair(&in[0], &in[1], false, &notes, why) &&
               compare_moments(&in[0].m, &in[1].m, &opt, &c, why);
     if (ok) {
         assert_int_equal(has_note(&notes, "share noise, as by a pixel filter or"), !naive);
@@ -249,7 +249,7 @@ TEST(test_mitsuba_integrator)
     b.m.mean[0] = 1;
     b.m.m2[0] = 4;
     b.m.m3[0] = 8;
-    assert_true(input_pair(&in, &b, &notes, &e));
+    assert_true(input_pair(&in, &b, false, &notes, &e));
     assert_true(has_note(&notes, "X, Y and Z"));
     double moved = pow(0.412453, 2) * 4 / 90, per_k3 = 100 * 99 * 98;
     assert_near(in.m.m3[0] / per_k3, pow(0.412453, 3) * 8 / 720 + pow(1.0 / 99 + moved, 1.5), 1e-8);
@@ -259,7 +259,7 @@ TEST(test_mitsuba_integrator)
     input_free(&b);
     /* Two of a kind, V = 2 v: k3A - k3B = V^1.5, and as R = 1, k3A^2 + k3B^2 = V^2 v: half of it each. */
     b = read_side(test_path("moment.exr"), (struct input_options){.spp = 100}, &notes);
-    assert_true(input_pair(&in, &b, &notes, &e));
+    assert_true(input_pair(&in, &b, false, &notes, &e));
     assert_near(in.m.m3[0] / per_k3, pow(2.0 / 99, 1.5) / 2, 1e-8);
     assert_near(b.m.m3[0] / per_k3, -pow(2.0 / 99, 1.5) / 2, 1e-8);
     input_free(&b);
@@ -295,7 +295,7 @@ static enum verdict compare_without_skewness(int n, double scale, int pixels, ui
         a.m.mean[i] = b.m.mean[i] = 1;
         a.m.m2[i] = b.m.m2[i] = 0;
     }
-    if (!input_pair(&a, &b, &notes, &e) || !compare_moments(&a.m, &b.m, &opt, &c, &e))
+    if (!input_pair(&a, &b, false, &notes, &e) || !compare_moments(&a.m, &b.m, &opt, &c, &e))
         fail_msg("%s", e.msg);
     return c.verdict;
 }
@@ -523,7 +523,7 @@ static enum verdict compare_files(const char *a, const char *b, struct compare_o
     struct input_options io = {.curve = "linear"};
     for (int i = 0; i < 2; i++)
         MUST(input_read(i ? b : a, "ab"[i], &io, &in[i], notes, &e));
-    if (!input_pair(&in[0], &in[1], notes, &e) ||
+    if (!input_pair(&in[0], &in[1], false, notes, &e) ||
         !compare_moments(&in[0].m, &in[1].m, &opt, &c, &e))
         fail_msg("%s", e.msg);
     input_limit(&in[0], opt.tile, &c);

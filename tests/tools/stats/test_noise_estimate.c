@@ -82,7 +82,7 @@ TEST(test_independent)
     struct err e;
     paint(&a, OWN, 1, &seed);
     paint(&b, OWN, 1, &seed);
-    assert_true(noise_estimate_variance(&a, &b, NULL, NULL, NULL, &s, &e));
+    assert_true(noise_estimate_variance(&a, &b, NULL, NULL, NULL, false, &s, &e));
     struct cell c = image_cell(&a, &b);
     double n = 65536, v = c.va + c.vb;
     assert_between(v / (2 * noise_sd * noise_sd * n), 0.97, 1.35);
@@ -109,7 +109,7 @@ TEST(test_shared)
     for (int k = 0; k < 2; k++) {
         paint(&a, cases[k].kind, 1, &seed);
         paint(&b, cases[k].kind, 1, &seed);
-        assert_true(noise_estimate_variance(&a, &b, NULL, NULL, NULL, &s, &e));
+        assert_true(noise_estimate_variance(&a, &b, NULL, NULL, NULL, false, &s, &e));
         struct cell c = image_cell(&a, &b);
         double independent = 2 * noise_sd * noise_sd * 65536;
         print_message("%.3g times the variance of independent pixels\n",
@@ -130,7 +130,7 @@ TEST(test_blind_to_sums)
             b.mean[3 * i + c] = 8;
             a.mean[3 * i + c] = 8 + (i % 32 > 11 ? 3 : 0) + (i / 32) % 5;
         }
-    assert_true(noise_estimate_variance(&a, &b, NULL, NULL, NULL, &s, &e));
+    assert_true(noise_estimate_variance(&a, &b, NULL, NULL, NULL, false, &s, &e));
     for (int i = 0; i < 3 * 32 * 32; i++)
         assert_true(a.m2[i] == 0 && b.m2[i] == 0);
 }
@@ -143,9 +143,9 @@ TEST(test_refused)
     uint64_t seed = 1;
     paint(&a, OWN, 1, &seed);
     paint(&b, OWN, 1, &seed);
-    REFUSES(noise_estimate_variance(&a, &b, NULL, NULL, NULL, &s, &e), "32 x 32");
+    REFUSES(noise_estimate_variance(&a, &b, NULL, NULL, NULL, false, &s, &e), "32 x 32");
     memcpy(b.mean, a.mean, 3 * 32 * 31 * sizeof *a.mean);
-    REFUSES(noise_estimate_variance(&a, &b, NULL, NULL, NULL, &s, &e), "same image");
+    REFUSES(noise_estimate_variance(&a, &b, NULL, NULL, NULL, false, &s, &e), "same image");
     moments_free(&a);
     moments_free(&b);
     a = new_moments(32, 32, "sample"), b = new_moments(32, 32, "sample");
@@ -154,15 +154,15 @@ TEST(test_refused)
     memset(censored, 0, 40);
     paint(&a, OWN, 1, &seed);
     paint(&b, OWN, 1, &seed);
-    REFUSES(noise_estimate_variance(&a, &b, NULL, NULL, censored, &s, &e), "saturated");
+    REFUSES(noise_estimate_variance(&a, &b, NULL, NULL, censored, false, &s, &e), "saturated");
     moments_free(&a);
     moments_free(&b);
 }
 
-/* How many of `runs` pairs come out DIFFERENT. decree: pixels are declared independent, that is, the
- * variance is divided by the factor for what neighbours share. */
+/* How many of `runs` pairs come out DIFFERENT. decree: the variance is divided by the factor for what neighbours share;
+ * independent: pixels are declared independent. */
 static int count_different(enum noise kind, double scale, double alpha, int runs, bool decree,
-                           uint64_t seed)
+                           bool independent, uint64_t seed)
 {
     OWN(moments) a = new_moments(64, 64, "sample"), b = new_moments(64, 64, "sample");
     struct compare_options opt = {.alpha = alpha, .tile = 16};
@@ -173,7 +173,7 @@ static int count_different(enum noise kind, double scale, double alpha, int runs
         struct err e;
         paint(&a, kind, scale, &seed);
         paint(&b, kind == BAND ? OWN : kind, 1, &seed);
-        MUST(noise_estimate_variance(&a, &b, NULL, NULL, NULL, &s, &e));
+        MUST(noise_estimate_variance(&a, &b, NULL, NULL, NULL, independent, &s, &e));
         double f = 1.5 * s.factor[0];
         for (int k = 0; decree && k < 3 * 64 * 64; k++) {
             a.m2[k] /= f;
@@ -206,7 +206,7 @@ TEST(test_same_but_in_a_square)
                                        p % width < at + side && p / width < at + side);
                  c++)
                 b.mean[3 * p + c] = a.mean[3 * p + c];
-        if (noise_estimate_variance(&a, &b, NULL, NULL, NULL, &s, &e)) {
+        if (noise_estimate_variance(&a, &b, NULL, NULL, NULL, false, &s, &e)) {
             struct cell all = image_cell(&a, &b);
             assert_true(isfinite(all.va) && isfinite(all.vb) && all.va > 0);
         } else {
@@ -225,18 +225,24 @@ TEST(test_false_alarms)
 {
     int most = 36;
     assert_true(gsl_cdf_binomial_Q(36, 0.05, 400) < 1e-3);
-    int own = count_different(OWN, 1, 0.05, 400, false, 21);
-    int shared = count_different(SHARED, 1, 0.05, 400, false, 22);
-    int smoothed = count_different(SMOOTHED, 1, 0.05, 400, false, 25);
-    int skewed = count_different(SKEWED, 1, 0.05, 400, false, 23);
-    int rows = count_different(ROWS, 1, 0.05, 400, false, 26);
-    int control = count_different(SHARED, 1, 0.05, 100, true, 24);
-    int control_rows = count_different(ROWS, 1, 0.05, 100, true, 27);
+    int own = count_different(OWN, 1, 0.05, 400, false, false, 21);
+    int shared = count_different(SHARED, 1, 0.05, 400, false, false, 22);
+    int smoothed = count_different(SMOOTHED, 1, 0.05, 400, false, false, 25);
+    int skewed = count_different(SKEWED, 1, 0.05, 400, false, false, 23);
+    int rows = count_different(ROWS, 1, 0.05, 400, false, false, 26);
+    int control = count_different(SHARED, 1, 0.05, 100, true, false, 24);
+    int control_rows = count_different(ROWS, 1, 0.05, 100, true, false, 27);
     print_message("false DIFFERENT of 400: own %d, shared %d, smoothed %d, skewed %d, rows %d; "
                   "controls %d and %d of 100\n",
                   own, shared, smoothed, skewed, rows, control, control_rows);
     assert_true(own <= most && shared <= most && smoothed <= most && skewed <= most);
     assert_true(rows <= most);
+    int declared = count_different(OWN, 1, 0.05, 400, false, true, 28);
+    int declared_skewed = count_different(SKEWED, 1, 0.05, 400, false, true, 29);
+    int wrongly = count_different(SHARED, 1, 0.05, 100, false, true, 30);
+    print_message("declared independent: own %d, skewed %d; shared %d of 100\n", declared,
+                  declared_skewed, wrongly);
+    assert_true(declared <= most && declared_skewed <= most && wrongly > 40);
     assert_true(control > 40 && control_rows > 40);
 }
 
@@ -245,6 +251,10 @@ TEST(test_false_alarms)
  * sqrt(2/768) = 0.5 % in a difference of 30 %. */
 TEST(test_power)
 {
-    assert_int_equal(count_different(OWN, 1.03, 1e-3, 50, false, 31), 50);
-    assert_int_equal(count_different(BAND, 1, 1e-3, 50, false, 32), 50);
+    assert_int_equal(count_different(OWN, 1.03, 1e-3, 50, false, false, 31), 50);
+    assert_int_equal(count_different(BAND, 1, 1e-3, 50, false, false, 32), 50);
+    /* A larger difference is not lost because skewness counts more the further out t is: with these 680 degrees of
+     * freedom, t of 40 and 80 for 10 and 20 %. */
+    assert_int_equal(count_different(SKEWED, 1.1, 1e-3, 20, false, false, 33), 20);
+    assert_int_equal(count_different(SKEWED, 1.2, 1e-3, 20, false, false, 34), 20);
 }
