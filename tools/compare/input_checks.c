@@ -3,10 +3,11 @@
 #include "variance_ratio.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 static const double floor_fraction =
-    0.05;                           /* of the mean luminance of B, as mean_without_lamps() has it */
+    0.05; /* of the mean luminance of what the lamps of B shine upon (mean_luminance()) */
 static const double brightest = 10; /* times that mean, as which a pixel counts there at most */
 /* So many times the other side's paths show what it has missed. With fewer, the longer side's own skewness
  * keeps regions of rare events from being tested (measured: 256 times no false DIFFERENT, 1024 times half). */
@@ -134,30 +135,48 @@ static void set_shares(const struct moments *a, const struct moments *b, struct 
         j->share[s] = applies[s] ? part[s] / sum : 0;
 }
 
-static double mean_luminance(const struct moments *m, double most)
+static int by_value(const void *a, const void *b)
 {
-    const size_t pixels = (size_t)m->width * (size_t)m->height;
-    double sum = 0;
-    for (size_t p = 0; p < pixels; p++) {
-        double l = 0;
-        for (size_t c = 0; c < 3; c++)
-            l += luminance_weight[c] * moments_mean(m, 3 * p + c);
-        sum += fmin(l, most);
-    }
-    return sum / (double)pixels;
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
 }
 
-/* The mean luminance of what a lamp in view shines upon: pixels count as at most ten times as bright. Otherwise a lamp
- * a thousand times as bright in one pixel of fifty would be the unit of all others, whose errors would count for
- * little. If much more than a tenth of the image is that bright, it is what the image shows. */
-static double mean_without_lamps(const struct moments *m, double mean)
+/* *mean: of the luminance. *lit: of what a lamp in view shines upon: pixels count as at most ten times as bright. Otherwise
+ * a lamp a thousand times as bright in one pixel of fifty would be the unit of all others, whose errors would count for
+ * little. If much more than a tenth of the image is that bright, it is what the image shows; so is a thing smaller than
+ * that before a black background. */
+static bool mean_luminance(const struct moments *m, double *mean, double *lit, struct err *e)
 {
-    double last = INFINITY;
-    while (mean < 0.99 * last) {
-        last = mean;
-        mean = mean_luminance(m, brightest * last);
+    const size_t pixels = (size_t)m->width * (size_t)m->height;
+    double *l = malloc(pixels * sizeof *l), most = 0, sum = 0;
+    if (l == NULL)
+        return err_set(e, "out of memory for the luminance of %zu pixels", pixels);
+    for (size_t p = 0; p < pixels; p++) {
+        l[p] = 0;
+        for (size_t c = 0; c < 3; c++)
+            l[p] += luminance_weight[c] * moments_mean(m, 3 * p + c);
+        most = fmax(most, l[p]);
+        sum += l[p];
     }
-    return mean;
+    *mean = *lit = sum / (double)pixels;
+    if (most > brightest * *lit)
+        qsort(l, pixels, sizeof *l, by_value);
+    /* Each step may be small, and there may be hundreds: what is too bright for one is too bright for all after it. */
+    double last = INFINITY;
+    for (size_t dimmer = pixels; *lit > 0 && *lit < 0.99 * last && most > brightest * *lit;) {
+        const double limit = brightest * *lit;
+        while (dimmer > 0 && l[dimmer - 1] > limit)
+            sum -= l[--dimmer];
+        if (dimmer == 0 || !(l[dimmer - 1] > 0)) {
+            *lit = *mean;
+            break;
+        }
+        const double next = (sum + limit * (double)(pixels - dimmer)) / (double)pixels;
+        last = *lit;
+        *lit = next > 0 ? next : last;
+    }
+    free(l);
+    return true;
 }
 
 bool input_checks_run(const struct moments *a, const struct moments *b,
@@ -184,9 +203,8 @@ bool input_checks_run(const struct moments *a, const struct moments *b,
         return false;
     for (int c = 0; c < 3; c++)
         j->event[CHANNEL_LUMINANCE] += luminance_weight[c] * j->event[c];
-    j->mean_b = mean_luminance(b, INFINITY);
-    if (!(j->mean_b > 0))
-        return err_set(e, "B is black: relative differences have no unit");
-    j->floor = floor_fraction * mean_without_lamps(b, j->mean_b);
-    return true;
+    if (!mean_luminance(b, &j->mean_b, &j->floor, e))
+        return false;
+    j->floor *= floor_fraction;
+    return j->mean_b > 0 || err_set(e, "B is black: relative differences have no unit");
 }

@@ -10,14 +10,21 @@ const LUMINANCE = [0.2126, 0.7152, 0.0722];
 const luminance = (three, i) =>
   LUMINANCE[0] * three[0][i] + LUMINANCE[1] * three[1][i] + LUMINANCE[2] * three[2][i];
 
-// The mean, in which no value counts as more than ten times it: a lamp in view is no unit of what it shines upon.
+// The mean, in which no value counts as more than ten times it: a lamp in view is no unit of what it shines upon. As
+// mean_luminance() in input_checks.c.
 function meanWithoutLamps(value) {
-  let last = Infinity, mean = value.reduce((sum, v) => sum + v, 0) / value.length;
-  while (mean < 0.99 * last) {
-    last = mean;
-    mean = value.reduce((sum, v) => sum + Math.min(v, 10 * last), 0) / value.length;
+  const sorted = Float64Array.from(value).sort();
+  let sum = value.reduce((all, v) => all + v, 0), dimmer = sorted.length, last = Infinity;
+  const mean = sum / sorted.length;
+  let lit = mean;
+  while (lit > 0 && lit < 0.99 * last) {
+    const limit = 10 * lit;
+    while (dimmer > 0 && sorted[dimmer - 1] > limit) sum -= sorted[--dimmer];
+    if (dimmer === 0 || !(sorted[dimmer - 1] > 0)) return mean;
+    last = lit;
+    lit = (sum + limit * (sorted.length - dimmer)) / sorted.length;
   }
-  return mean;
+  return lit > 0 ? lit : Math.max(0, Math.min(last, mean));
 }
 
 // The image's luminance, its standard error (channels taken as fully correlated), and the least unit of differences.

@@ -536,6 +536,25 @@ TEST(test_lamp_in_view)
     }
 }
 
+/* A lit thing in 16 of 1024 pixels, all else black: it is what the image shows, and no lamp. 5 % of the mean, 1/64, is then
+ * the unit of a black tile in which A has 1e-5 everywhere: 1.3 %, within 8 %; ten times as much is not. */
+TEST(test_black_background)
+{
+    for (int times = 1; times <= 10; times += 9) {
+        OWN(moments) a = new_moments(32, 32, "exact"), b = new_moments(32, 32, "exact");
+        constant(&a, 0, 1);
+        constant(&b, 0, 1);
+        for (int i = 0; i < 3 * 4 * 4; i++) {
+            size_t at = (size_t)(i / (3 * 4) * 3 * 32 + i % (3 * 4));
+            a.mean[at] = b.mean[at] = 1;
+        }
+        for (int i = 0; i < 3 * 8 * 8; i++)
+            a.mean[(24 + i / (3 * 8)) * 3 * 32 + 3 * 24 + i % (3 * 8)] = 1e-5 * times;
+        enum verdict v = verdict_of(&a, &b, (struct compare_options){1e-3, 0.02, 0.08, 8, 0, 1});
+        assert_int_equal(v, times == 1 ? VERDICT_EQUIVALENT : VERDICT_DIFFERENT);
+    }
+}
+
 /* A tile that is too skewed is judged within what is around it: its MDB is that of the image times
  * their ratio of radiance. And a moderately skewed interval is widened, never narrowed. */
 TEST(test_skewed_tile)
