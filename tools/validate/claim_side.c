@@ -273,12 +273,14 @@ static bool is_made_by(const struct engine *en, const char *name, const json_t *
     return n > 0 && strncmp(name, en->name, n) == 0 && (name[n] == '\0' || name[n] == '-');
 }
 
-json_t *side_renewal(const struct validation *v, const struct side *s, const json_t *manifest)
+bool side_renewal(const struct validation *v, const struct side *s, const json_t *manifest,
+                  json_t **out)
 {
+    *out = NULL;
     const char *scene = s->scene->references_of;
     const bool ours = engine_with_goldens(s->name) != NULL;
     if (!ours && !is_made_by(v->opt->engine, s->name, manifest))
-        return NULL;
+        return true;
     json_t *render = json_pack("[s,s]", "golden", "render"),
            *approve = json_pack("[s,s]", "golden", "approve");
     side_add_places(v, false, render);
@@ -288,12 +290,13 @@ json_t *side_renewal(const struct validation *v, const struct side *s, const jso
     side_add_places(v, true, approve);
     add_words(approve, (const char *[]){"--new", fs_path("%s/%s", scene, s->name).s, NULL});
     char *first = json_command_line("assay", render), *then = json_command_line("assay", approve);
-    json_t *both = first != NULL && then != NULL ? json_sprintf("%s\n%s", first, then) : NULL;
+    if (first != NULL && then != NULL)
+        *out = json_sprintf("%s\n%s", first, then);
     free(first);
     free(then);
     json_decref(render);
     json_decref(approve);
-    return both;
+    return *out != NULL;
 }
 
 /* Adds to a line that says that a reference of a suite of one's own is missing or stale how it is made. */
@@ -301,9 +304,12 @@ static void say_renewal(const struct validation *v, const struct side *s, const 
                         struct err *e)
 {
     const struct err why = *e;
-    json_t *commands = side_renewal(v, s, manifest);
+    json_t *commands;
+    const bool ok = side_renewal(v, s, manifest, &commands);
     const char *render = json_string_value(commands);
-    if (render != NULL)
+    if (!ok)
+        err_set(e, "%.500s: out of memory for the commands that make it", why.msg);
+    else if (render != NULL)
         err_set(e, "%.500s: %.*s && %s", why.msg, (int)strcspn(render, "\n"), render,
                 strchr(render, '\n') + 1);
     else

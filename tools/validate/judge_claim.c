@@ -102,7 +102,9 @@ static bool write_maps(const struct validation *v, const struct claim_run *t, js
     return true;
 }
 
-static void add_provenance(json_t *claim, const struct validation *v, const struct claim_run *t)
+/* renewal: of side_renewal(), or NULL. */
+static void add_provenance(json_t *claim, const struct validation *v, const struct claim_run *t,
+                           json_t *renewal)
 {
     const struct side_image *a = t->seen[0], *b = t->seen[1];
     claim_result_add_observations(claim, "a", &a->m);
@@ -127,11 +129,8 @@ static void add_provenance(json_t *claim, const struct validation *v, const stru
         json_object_set(claim, "version_b", version);
     if (seeds != NULL)
         json_object_set(claim, "seeds_b", seeds);
-    if (t->b->kind != SIDE_GOLDEN)
-        return;
-    json_t *commands = side_renewal(v, t->b, b->manifest);
-    if (commands != NULL)
-        json_object_set_new(claim, "renew", commands);
+    if (renewal != NULL)
+        json_object_set(claim, "renew", renewal);
 }
 
 static json_t *files_of(const struct validation *v, const struct claim_run *t, struct err *e)
@@ -211,12 +210,13 @@ static void finish(struct validation *v, struct claim_run *t, const char *why)
     char *rerun = rerun_command(v, t), reason[512];
     struct err e = {""};
     struct claim_context c = context(v, t, rerun);
-    json_t *files = files_of(v, t, &e);
-    if (files != NULL && rerun != NULL)
+    json_t *files = files_of(v, t, &e), *renewal = NULL;
+    if (files != NULL && rerun != NULL &&
+        (t->b->kind != SIDE_GOLDEN || side_renewal(v, t->b, t->seen[1]->manifest, &renewal)))
         t->result = claim_result_judged(&c, &t->c);
     if (t->result != NULL) {
         json_object_set(t->result, "files", files);
-        add_provenance(t->result, v, t);
+        add_provenance(t->result, v, t, renewal);
         if (why != NULL) {
             snprintf(reason, sizeof reason, "%s; %s", why, t->c.reason);
             json_object_set_new(t->result, "reason", json_string(reason));
@@ -232,6 +232,7 @@ static void finish(struct validation *v, struct claim_run *t, const char *why)
         t->result = claim_result_not_judged(&c, e.msg[0] ? e.msg : "out of memory");
     }
     json_decref(files);
+    json_decref(renewal);
     free(rerun);
     add_looks(t->result, v, t);
     announce(v, t);

@@ -120,10 +120,12 @@ NODISCARD bool side_write(const struct validation *v, struct side *s, int stage,
 /* Appends the words of --suite and, of_goldens, --golden, with full paths, unless a command finds them by itself in any
  * folder. */
 void side_add_places(const struct validation *v, bool of_goldens, json_t *words);
-/* The commands, for people, that make a stored reference anew: "assay golden render ...", and in the next line "assay golden
- * approve ...", a new reference. NULL if out of memory, or if nobody knows what makes it: neither an engine of ours nor the one
- * that is judged, which made what is stored (manifest; NULL: nothing), or whose name it has, or that and -VERSION. */
-json_t *side_renewal(const struct validation *v, const struct side *s, const json_t *manifest);
+/* The commands, for people, that make a stored reference anew: "assay golden render ...", and in the next line "assay
+ * golden approve ...", a new reference. *out NULL: nobody knows what makes it, neither an engine of ours nor the one that
+ * is judged, which made what is stored (manifest; NULL: nothing), or whose name it has, or that and -VERSION. False if
+ * out of memory. */
+NODISCARD bool side_renewal(const struct validation *v, const struct side *s,
+                            const json_t *manifest, json_t **out);
 void side_free(struct side *s);
 
 /* Does --only select any claim of a scene? All of them? */
