@@ -124,7 +124,7 @@ static bool scene_load(struct page *p, struct scene *s, const struct claim_ref *
     return ok;
 }
 
-/* "2048 samples per pixel", "16 replicates of 256 samples per pixel", "without noise". */
+/* "2048 samples per pixel", "16 replicates of 256 samples per pixel", "without noise"; a single image has no n. */
 static void print_observations(FILE *f, const struct moments *m)
 {
     size_t pixels = (size_t)m->width * (size_t)m->height;
@@ -134,6 +134,8 @@ static void print_observations(FILE *f, const struct moments *m)
     double n = sum / (double)pixels;
     if (moments_is_exact(m))
         fputs("without noise", f);
+    else if (moments_noise_is_unknown(m))
+        fputs("one image, its noise estimated", f);
     else if (strcmp(m->unit, "sample") == 0)
         fprintf(f, "%.0f samples per pixel", n);
     else if (m->spp > 0)
