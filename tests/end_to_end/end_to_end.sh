@@ -374,6 +374,8 @@ expect "compare: PNG against moments" 1 "is not used" \
     "$san_assay" compare --curve srgb --filter-width 1 "$tmp/shallow.png" "$tmp/two.exr"
 expect "compare: independent pixels, said of nothing" 3 "whose noise is not known" \
     "$san_assay" compare --filter-width 1 "$tmp/one.exr" "$tmp/two.exr"
+expect "compare: nor of whole images" 3 "exchangeable takes whole images" \
+    "$san_assay" compare --exchangeable --filter-width 1 "$tmp/runs_c" "$tmp/runs_b"
 expect "compare: the same PNG" 3 "the same image" \
     "$san_assay" compare --curve srgb "$tmp/one.png" "$tmp/one.png"
 expect "compare: a curve for nothing" 3 "neither" \

@@ -44,6 +44,8 @@ bool compare_job_check(struct compare_job *job, struct err *e)
     if (job->same_program && (job->exchangeable || job->paired || job->again[0] != NULL))
         return err_set(e, "--same-program is exact from one pair of renders with seeds of their "
                           "own: it takes neither --exchangeable nor --again nor --paired");
+    if (job->exchangeable && job->filter_width > 0)
+        return err_set(e, "--exchangeable takes whole images: --filter-width is for others");
     if (!job->same_program && job->filter_width > 1)
         return err_set(e, "--filter-width %d is for --same-program; other images can only have 1",
                        job->filter_width);
