@@ -2,12 +2,13 @@
 
 #include "variance_ratio.h"
 
+#include <gsl/gsl_sort.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 static const double floor_fraction =
-    0.05; /* of the mean luminance of what the lamps of B shine upon (mean_luminance()) */
+    0.05; /* of the mean luminance of what the lamps of B shine upon (mean_without_lamps()) */
 static const double brightest = 10; /* times that mean, as which a pixel counts there at most */
 /* So many times the other side's paths show what it has missed. With fewer, the longer side's own skewness
  * keeps regions of rare events from being tested (measured: 256 times no false DIFFERENT, 1024 times half). */
@@ -135,16 +136,32 @@ static void set_shares(const struct moments *a, const struct moments *b, struct 
         j->share[s] = applies[s] ? part[s] / sum : 0;
 }
 
-static int by_value(const void *a, const void *b)
+/* The mean of values, which it sorts, in which none counts as more than ten times that mean. Otherwise a lamp in view,
+ * a thousand times as bright in one pixel of fifty, would be the unit of all that it shines upon, whose errors would
+ * count for little. If much more than a tenth of the image is that bright, it is what the image shows; so is a thing
+ * smaller than that before a black background. */
+static double mean_without_lamps(double *value, size_t num, double sum)
 {
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
+    const double mean = sum / (double)num;
+    double lit = mean, last = INFINITY;
+    size_t dimmer = num;
+    gsl_sort(value, 1, num);
+    /* Each step may be small, and there may be hundreds: what is too bright for one is too bright for all after it. */
+    while (lit < 0.99 * last) {
+        const double limit = brightest * lit;
+        while (dimmer > 0 && value[dimmer - 1] > limit)
+            sum -= value[--dimmer];
+        if (dimmer == 0 || !(value[dimmer - 1] > 0))
+            return mean;
+        last = lit;
+        lit = (sum + limit * (double)(num - dimmer)) / (double)num;
+        if (!(lit > 0))
+            return last;
+    }
+    return lit;
 }
 
-/* *mean: of the luminance. *lit: of what a lamp in view shines upon: pixels count as at most ten times as bright. Otherwise
- * a lamp a thousand times as bright in one pixel of fifty would be the unit of all others, whose errors would count for
- * little. If much more than a tenth of the image is that bright, it is what the image shows; so is a thing smaller than
- * that before a black background. */
+/* *mean: of the luminance; *lit: without lamps. */
 static bool mean_luminance(const struct moments *m, double *mean, double *lit, struct err *e)
 {
     const size_t pixels = (size_t)m->width * (size_t)m->height;
@@ -159,22 +176,8 @@ static bool mean_luminance(const struct moments *m, double *mean, double *lit, s
         sum += l[p];
     }
     *mean = *lit = sum / (double)pixels;
-    if (most > brightest * *lit)
-        qsort(l, pixels, sizeof *l, by_value);
-    /* Each step may be small, and there may be hundreds: what is too bright for one is too bright for all after it. */
-    double last = INFINITY;
-    for (size_t dimmer = pixels; *lit > 0 && *lit < 0.99 * last && most > brightest * *lit;) {
-        const double limit = brightest * *lit;
-        while (dimmer > 0 && l[dimmer - 1] > limit)
-            sum -= l[--dimmer];
-        if (dimmer == 0 || !(l[dimmer - 1] > 0)) {
-            *lit = *mean;
-            break;
-        }
-        const double next = (sum + limit * (double)(pixels - dimmer)) / (double)pixels;
-        last = *lit;
-        *lit = next > 0 ? next : last;
-    }
+    if (*mean > 0 && most > brightest * *mean)
+        *lit = mean_without_lamps(l, pixels, sum);
     free(l);
     return true;
 }

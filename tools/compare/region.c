@@ -218,13 +218,18 @@ static double t_of_least_p(double dof, double skew)
     return root[0];
 }
 
+static double log10_p_at(const struct measured *m, double t, double skew)
+{
+    return stats_t_log10_p(t, m->dof) + skew_at(skew, t) / log(10);
+}
+
 /* A larger t is no likelier than a smaller one, so that it has the least p of these. */
 static double raised_log10_p(const struct measured *m, double t, double skew)
 {
-    const double least = fmin(t, t_of_least_p(m->dof, skew));
-    double log10_p = stats_t_log10_p(t, m->dof) + skew_at(skew, t) / log(10);
+    const double least = t_of_least_p(m->dof, skew);
+    double log10_p = log10_p_at(m, t, skew);
     if (least < t)
-        log10_p = fmin(log10_p, stats_t_log10_p(least, m->dof) + skew_at(skew, least) / log(10));
+        log10_p = fmin(log10_p, log10_p_at(m, least, skew));
     return fmin(0, fmax(region_smallest_log10_p, log10_p));
 }
 
@@ -246,16 +251,18 @@ double region_missed_z(const struct judge *j, const struct measured *m, int chan
     return log10_p < -300 ? INFINITY : stats_normal_quantile(pow(10, log10_p) / 2);
 }
 
+static double rank_at(const struct measured *m, double t, double skew)
+{
+    const double z = stats_z_of_t(t, m->dof);
+    return z * z - 2 * skew_at(skew, t);
+}
+
 double region_rank(const struct judge *j, const struct measured *m)
 {
-    const double skew = skew_of_p(j, m), far = fmax(0, region_excess_t(m)),
-                 t[2] = {far, fmin(far, t_of_least_p(m->dof, skew))};
-    double rank = 0;
-    for (int i = 0; i < (t[1] < far ? 2 : 1); i++) {
-        const double z = stats_z_of_t(t[i], m->dof);
-        rank = fmax(rank, z * z - 2 * skew_at(skew, t[i]));
-    }
-    return sqrt(rank);
+    const double skew = skew_of_p(j, m), t = fmax(0, region_excess_t(m)),
+                 least = t_of_least_p(m->dof, skew);
+    const double rank = rank_at(m, t, skew);
+    return sqrt(fmax(0, least < t ? fmax(rank, rank_at(m, least, skew)) : rank));
 }
 
 double region_log10_p_equal(const struct judge *j, const struct measured *m, int channel)

@@ -72,8 +72,7 @@ int carried_part_of(const struct rubric *r, const struct bug *b)
 struct carry {
     const struct grading *g;
     int with, bug[2], paid[2], num; /* bugs, and the parts in which they are paid */
-    bool is_right
-        [RUBRIC_PARTS]; /* parts of which a check had all points before anything was carried */
+    bool is_right[RUBRIC_PARTS];    /* a check of the part had all points before any came back */
 };
 
 static bool loses(const struct rubric *r, const struct result *result, int part)

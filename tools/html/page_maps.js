@@ -11,7 +11,7 @@ const luminance = (three, i) =>
   LUMINANCE[0] * three[0][i] + LUMINANCE[1] * three[1][i] + LUMINANCE[2] * three[2][i];
 
 // The mean, in which no value counts as more than ten times it: a lamp in view is no unit of what it shines upon. As
-// mean_luminance() in input_checks.c.
+// mean_without_lamps() in input_checks.c.
 function meanWithoutLamps(value) {
   const sorted = Float64Array.from(value).sort();
   let sum = value.reduce((all, v) => all + v, 0), dimmer = sorted.length, last = Infinity;

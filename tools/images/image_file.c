@@ -8,36 +8,29 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The third number of a PPM's or PGM's header, the brightest code; 0 if it has none. */
-static int brightest_code(const char *path)
+/* The next number of a PPM's header, after blanks and comments; 0 if there is none. */
+static int next_number(FILE *f)
 {
-    int number[3] = {0}, digits = 0, num = 0, c;
-    FILE *f = fs_open(path);
-    if (f == NULL || fgetc(f) != 'P' || fgetc(f) == EOF)
-        num = 3;
-    while (num < 3 && (c = fgetc(f)) != EOF) {
-        if (isdigit(c) && digits < 6) {
-            number[num] = 10 * number[num] + c - '0';
-            digits++;
-            continue;
-        }
-        num += digits > 0;
-        digits = 0;
-        while (c == '#' && (c = fgetc(f)) != '\n')
-            c = c == EOF ? EOF : '#';
-        if (c != EOF && !isspace(c))
-            break;
-    }
-    if (f != NULL)
-        fclose(f);
-    return num == 3 ? number[2] : 0;
+    int c, number = 0;
+    while (isspace(c = fgetc(f)) || c == '#')
+        for (bool in_comment = c == '#'; in_comment; in_comment = c != '\n' && c != EOF)
+            c = fgetc(f);
+    ungetc(c, f);
+    return fscanf(f, "%9d", &number) == 1 ? number : 0;
 }
 
 /* Codes up to another number than 255 or 65535 are spread over these when they are read, so that nothing would tell how
  * coarse they were. */
 static bool has_all_codes(const char *path, const struct image_info *info)
 {
-    const int brightest = brightest_code(path);
+    int brightest = 0;
+    FILE *f = fs_open(path);
+    if (f == NULL)
+        return false;
+    fseek(f, 2, SEEK_SET);      /* after "P3" or the like */
+    for (int i = 0; i < 3; i++) /* width, height, brightest code */
+        brightest = next_number(f);
+    fclose(f);
     return brightest == (info->type == IMAGE_INT8 ? 255 : 65535);
 }
 
@@ -110,12 +103,13 @@ static double paths_of(const struct image *im)
     return fmax(0, sum / (double)pixels * atof(each));
 }
 
-bool image_file_from_image(const char *path, const struct image *im, const struct image_info *info,
-                           struct image_file *out, struct err *e)
+/* image_file_from_image() of a file that check_file() has passed. */
+static bool take_pixels(const char *path, const struct image *im, const struct image_info *info,
+                        struct image_file *out, struct err *e)
 {
     int at[3], alpha;
     *out = (struct image_file){.width = im->width, .height = im->height, .info = *info};
-    if (!check_file(path, info, e) || !channels_of(path, im, at, &alpha, e))
+    if (!channels_of(path, im, at, &alpha, e))
         return false;
     out->spp = paths_of(im);
     out->num_other = im->channels - (at[0] == at[1] ? 1 : 3) - (alpha >= 0);
@@ -145,6 +139,12 @@ bool image_file_from_image(const char *path, const struct image *im, const struc
     return true;
 }
 
+bool image_file_from_image(const char *path, const struct image *im, const struct image_info *info,
+                           struct image_file *out, struct err *e)
+{
+    return check_file(path, info, e) && take_pixels(path, im, info, out, e);
+}
+
 bool image_file_read(const char *path, struct image_file *out, struct err *e)
 {
     struct image_info info;
@@ -157,7 +157,7 @@ bool image_file_read_inspected(const char *path, const struct image_info *info,
     struct image im = {0};
     if (!check_file(path, info, e) || !image_read(path, &im, NULL, e))
         return false;
-    bool ok = image_uncrop(info, &im, e) && image_file_from_image(path, &im, info, out, e);
+    bool ok = image_uncrop(info, &im, e) && take_pixels(path, &im, info, out, e);
     image_free(&im);
     return ok;
 }
