@@ -30,7 +30,8 @@ OPT      := -O3 -g -fno-math-errno -fno-trapping-math
 WARN      = -Wall -Wextra $(if $(WERROR),-Werror)
 WARN_C    = $(WARN) -Wshadow -Wstrict-prototypes -Wswitch-enum -Wvla
 # -ffp-contract=off: the same bits whether or not a processor can multiply and add in one step.
-cflags    = -std=c17 $(OPT) -ffp-contract=off $(WARN_C) -D_XOPEN_SOURCE=700 -pthread $(CFLAGS) -I. $(pkg_cflags)
+# defs: what single objects need; CFLAGS, CXXFLAGS and LDFLAGS are the user's.
+cflags    = -std=c17 $(OPT) -ffp-contract=off $(WARN_C) -D_XOPEN_SOURCE=700 -pthread $(CFLAGS) $(defs) -I. $(pkg_cflags)
 # OpenImageIO is in oiio.so alone (renderer/image/image_oiio.h).
 cxxflags  = -std=c++17 -fPIC $(OPT) $(WARN) $(CXXFLAGS) -I. $(shell pkg-config --cflags OpenImageIO | sed 's/-I/-isystem /g')
 
@@ -99,7 +100,7 @@ define compile_cxx
 endef
 define link
 	$(call say,LINK,$@)
-	$(Q)mkdir -p $(@D) && $(CXX) $(OPT) -o $@ $(filter %.o,$^) $(filter %.a,$^) $(LIBS) $(TEST_LIBS)
+	$(Q)mkdir -p $(@D) && $(CXX) $(OPT) -o $@ $(filter %.o,$^) $(filter %.a,$^) $(LDFLAGS) $(LIBS) $(TEST_LIBS)
 endef
 define archive
 	$(call say,AR,$@)
@@ -109,11 +110,11 @@ endef
 isa_sse42  := -msse4.2
 isa_avx2   := -mavx2 -mfma -mbmi -mbmi2 -mpopcnt -mlzcnt
 isa_avx512 := $(isa_avx2) -mavx512f -mavx512vl -mavx512bw -mavx512dq
-# -Wno-psabi: no vector of 32 or 64 bytes is passed between files.
+# -Wno-psabi: no vector of 32 or 64 bytes is passed between files. -g1: clang 14 crashes on -g with sixteen lanes.
 isa_lanes   = $(if $(and $(filter avx512,$(1)),$(filter $(SIXTEEN),$(2))),16,8)
-isa_flags   = -DISA=$(1) $(if $(isa_$(1)),-DLANES=$(isa_lanes)) $(isa_$(1)) -Wno-psabi
+isa_flags   = -DISA=$(1) $(if $(isa_$(1)),-DLANES=$(isa_lanes)) $(isa_$(1)) -Wno-psabi -g1
 define kernel_object
-$(1)/$(2)_$(3).c.o: CFLAGS += $(call isa_flags,$(3),$(2))
+$(1)/$(2)_$(3).c.o: defs += $(call isa_flags,$(3),$(2))
 $(1)/$(2)_$(3).c.o: $(2).c | $(4)
 	$$(compile_c)
 endef
@@ -134,12 +135,12 @@ $(1)/assay: $(1)/tools/commands/assay.c.o $(1)/libassay.a
 	$$(link)
 $(1)/oiio.so: $(1)/renderer/image/oiio.cc.o
 	$$(call say,LINK,$$@)
-	$$(Q)$$(CXX) $$(OPT) -shared -o $$@ $$< $$(shell pkg-config --libs OpenImageIO)
+	$$(Q)$$(CXX) $$(OPT) $$(LDFLAGS) -shared -o $$@ $$< $$(shell pkg-config --libs OpenImageIO)
 # What the compiler's dependency files cannot know: the page's parts are read by the assembler, and
 # only version.c knows the commit.
 $(1)/tools/html/page_assets.c.o: $(wildcard tools/html/page*.css tools/html/page*.js)
 $(1)/renderer/base/version.c.o: $(BUILD)/commit
-$(1)/renderer/base/version.c.o: CFLAGS += -DASSAY_VERSION='"$(VERSION)"' -DASSAY_COMMIT='"$(COMMIT)"'
+$(1)/renderer/base/version.c.o: defs += -DASSAY_VERSION='"$(VERSION)"' -DASSAY_COMMIT='"$(COMMIT)"'
 endef
 $(eval $(call tree,$(BUILD),$(BUILD)/deps))
 

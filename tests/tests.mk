@@ -53,7 +53,6 @@ $(BUILD)/clang/%: private WERROR := 1
 $(BUILD)/tsan/%: private OPT := -O1 -g -fno-omit-frame-pointer -fsanitize=thread
 $(BUILD)/cov/%: private CC := clang
 $(BUILD)/cov/%: private CXX := clang++
-# Without -g, on which clang 14 crashes in the kernels of sixteen lanes.
 $(BUILD)/cov/%: private OPT := -O2 -fprofile-instr-generate -fcoverage-mapping
 $(BUILD)/cov/%: private WERROR := 1
 # Code that no fuzzer runs is compiled without sanitizers, in a fifth of the time; a fuzzer that ran it would abort
@@ -98,7 +97,7 @@ $(BUILD)/san/pathtracer $(BUILD)/san/assay: $(BUILD)/san/tests/support/asan_opti
 $(call obj,$(BUILD),$(TESTS) $(PROGRAMS) $(BENCH) $(SUPPORT) tests/support/asan_options.c tests/end_to_end/no_memory.c): | $(BUILD)/deps-test
 $(BUILD)/tests/bench: $(call obj,$(BUILD),$(BENCH))
 # The peer is compiled for this machine's instructions; our renderer chooses its own at start.
-$(BUILD)/tests/studies/bench/embree_tracer.c.o: CFLAGS += -march=native -ffast-math -ffp-contract=fast
+$(BUILD)/tests/studies/bench/embree_tracer.c.o: defs += -march=native -ffast-math -ffp-contract=fast
 # playwright-core, with which pages are tested in Debian's chromium; without it those tests are skipped, and say so.
 $(BUILD)/browser/package-lock.json: tests/browser/package-lock.json tests/browser/package.json | $(BUILD)/deps-test
 	$(call say,NPM,$@)
@@ -122,7 +121,7 @@ endef
 $(BUILD)/clang/%.c.ok: %.c | $(BUILD)/deps-test
 	$(clang_ok)
 define kernel_ok
-$(BUILD)/clang/$(1)_$(2).c.ok: CFLAGS += $(call isa_flags,$(2),$(1))
+$(BUILD)/clang/$(1)_$(2).c.ok: defs += $(call isa_flags,$(2),$(1))
 $(BUILD)/clang/$(1)_$(2).c.ok: $(1).c | $(BUILD)/deps-test
 	$$(clang_ok)
 endef

@@ -27,6 +27,8 @@ if command -v groff >/dev/null; then
 else
     echo "skip packaging: no groff"
 fi
+tell "the kernels of sixteen lanes compile with clang, and with flags of the user's own" "$(make BUILD="$tmp/other" CC=clang CFLAGS=-O1 \
+    "$tmp"/other/renderer/{transport/integrator_simd_avx512,base/version}.c.o >"$tmp/log" 2>&1 || tail -n 3 "$tmp/log")"
 expect "did you mean" 3 "did you mean validate?" "$build/assay" valdiate
 
 # Each step of the workflow, in a repository laid out as it expects, whose renderer is right at first and then wrong.

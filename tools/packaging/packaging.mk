@@ -11,11 +11,11 @@ LIBRARY_SOURCES := $(wildcard $(addsuffix /*.c,$(addprefix renderer/,base math i
   $(addprefix tools/,images stats compare exact input sequential results html plots report library)) \
   $(addprefix reference/replicates/,independence.c replicates.c shared_noise.c) $(addprefix tools/base/,temp_dir.c text.c text_table.c) \
   tools/validate/compare_job.c tools/validate/same_program.c)
-$(call obj,$(BUILD),$(LIBRARY_SOURCES)): CFLAGS += -fPIC -fno-semantic-interposition
+$(call obj,$(BUILD),$(LIBRARY_SOURCES)): defs += -fPIC -fno-semantic-interposition
 $(BUILD)/libassay.so.$(LIBRARY_ABI): $(call obj,$(BUILD),$(LIBRARY_SOURCES)) tools/library/assay.map | $(BUILD)/oiio.so
 	$(call say,LINK,$@)
 	$(Q)$(CXX) $(OPT) -shared -Wl,-soname,$(@F) -Wl,--version-script=tools/library/assay.map -Wl,-z,defs -Wl,--gc-sections \
-	  -o $@ $(filter %.o,$^) $(LIBS) -ldl && ln -sf $(@F) $(BUILD)/libassay.so
+	  -o $@ $(filter %.o,$^) $(LDFLAGS) $(LIBS) -ldl && ln -sf $(@F) $(BUILD)/libassay.so
 #: make library    build/libassay.so (tools/library/assay.h); from Python: pip install --no-build-isolation tools/python
 library: $(BUILD)/libassay.so.$(LIBRARY_ABI)
 
