@@ -260,7 +260,8 @@ bool sheet_shares_noise(const struct sheet *s, bool *shares, struct err *e)
     if (lines == NULL)
         return err_set(e, "out of memory for %d lines", longest);
     *shares = neighbours_share_noise(s) || lines_share_noise(s, false, lines) ||
-              lines_share_noise(s, true, lines);
+              lines_share_noise(s, true, lines) ||
+              line_noise_begins_alike(s->score, s->num, s->width, s->height);
     free(lines);
     return true;
 }

@@ -123,9 +123,11 @@ void same_program_decide(const struct sign_flip *f, double alpha, struct compari
     r->extra_factor = 1;
     if (f->shares_noise) {
         r->verdict = VERDICT_INCONCLUSIVE;
-        snprintf(r->reason, size,
-                 "pixels look as if they shared noise with their neighbours or their line: "
-                 "--filter-width N says how wide a filter is, in pixels (1: they share none)");
+        snprintf(
+            r->reason, size,
+            "pixels look as if they shared noise: by a filter (--filter-width N is its width in pixels; 1: they "
+            "share none), or as every row or tile begins the same random numbers (compare directories of "
+            "renders, without --same-program)");
     } else if (f->log10_p <= log10(alpha)) {
         const char *more = f->t > 0 ? "brighter" : "darker",
                    *noise = f->t > 0 ? "noisier" : "less noisy";
