@@ -13,6 +13,7 @@
 
 static const double most_censored = 0.05;     /* of the image, for EQUIVALENT */
 static const double most_censored_tile = 0.5; /* of a reporting tile */
+enum { WHITE = 7 };                           /* in censored[] */
 static const double sharing_alpha = 1e-6;     /* of "pixels share noise" where they do not */
 static const double least_correlation = 0.1;  /* of two renders that share noise */
 enum { most_measured = 64 };                  /* renders that this is measured on */
@@ -207,7 +208,7 @@ static bool censor(struct input *a, struct input *b, struct notes *notes, struct
 {
     if (a->censored == NULL && b->censored == NULL)
         return true;
-    size_t pixels = (size_t)a->m.width * (size_t)a->m.height, num = 0;
+    size_t pixels = (size_t)a->m.width * (size_t)a->m.height, num = 0, white = 0;
     for (int i = 0; i < 2; i++) {
         struct input *in = i ? b : a;
         if (in->censored == NULL)
@@ -216,9 +217,11 @@ static bool censor(struct input *a, struct input *b, struct notes *notes, struct
             return err_set(e, "out of memory for %zu pixels", pixels);
     }
     for (size_t p = 0; p < pixels; p++) {
-        bool out = a->censored[p] || b->censored[p];
-        a->censored[p] = b->censored[p] = out;
+        const bool out = a->censored[p] || b->censored[p];
+        const bool is_white = (a->censored[p] & b->censored[p]) == WHITE;
+        a->censored[p] = b->censored[p] = is_white ? WHITE : out;
         num += out;
+        white += is_white;
         for (size_t i = 3 * p; out && i < 3 * p + 3; i++) {
             a->m.mean[i] = b->m.mean[i] = 0;
             a->m.m2[i] = b->m.m2[i] = a->m.m3[i] = b->m.m3[i] = 0;
@@ -229,14 +232,16 @@ static bool censor(struct input *a, struct input *b, struct notes *notes, struct
         }
     }
     a->num_censored = b->num_censored = num;
+    a->num_white = b->num_white = white;
     if (num == pixels)
         return err_set(e, "every pixel is saturated in one of the images");
     if (num > 0)
         input_notes_add(
             notes,
             "saturated: %zu of %zu pixels (%.2g %%) have the brightest code in an image; they are in "
-            "no sum and nothing is said of them. Regions around them are measured by what is left",
-            num, pixels, 100 * (double)num / (double)pixels);
+            "no sum. %zu are white in both: equal as far as codes go, how bright is not known. Of the others nothing is "
+            "said. Regions around them are measured by what is left",
+            num, pixels, 100 * (double)num / (double)pixels, white);
     return true;
 }
 
@@ -337,7 +342,8 @@ void input_limit(const struct input *a, int tile, struct comparison *c)
 {
     if (a->censored == NULL)
         return;
-    double pixels = (double)a->m.width * a->m.height, share = (double)a->num_censored / pixels;
+    double pixels = (double)a->m.width * a->m.height,
+           share = (double)(a->num_censored - a->num_white) / pixels;
     double worst = 0;
     int worst_x = 0, worst_y = 0;
     for (int row = 0; row < c->tiles_y; row++)
@@ -347,7 +353,7 @@ void input_limit(const struct input *a, int tile, struct comparison *c)
             double num = 0;
             for (int i = y; i < bottom; i++)
                 for (int j = x; j < right; j++)
-                    num += a->censored[(size_t)i * (size_t)a->m.width + (size_t)j] != 0;
+                    num += a->censored[(size_t)i * (size_t)a->m.width + (size_t)j] % WHITE != 0;
             num /= (double)(right - x) * (bottom - y);
             if (num > worst) {
                 worst = num;
@@ -365,12 +371,13 @@ void input_limit(const struct input *a, int tile, struct comparison *c)
     if (share > most_censored)
         snprintf(
             c->reason, sizeof c->reason,
-            "%.3g %% of the pixels are saturated, more than the %.3g %% that may be: nothing is "
-            "known of them",
+            "%.3g %% of the pixels are saturated and not white in both images, more than the %.3g %% that may be: they may "
+            "hide a difference; make darker images, or files of floats",
             100 * share, 100 * most_censored);
     else
-        snprintf(c->reason, sizeof c->reason,
-                 "%.3g %% of the tile at %d,%d is saturated: nothing is "
-                 "known of it",
-                 100 * worst, worst_x, worst_y);
+        snprintf(
+            c->reason, sizeof c->reason,
+            "%.3g %% of the tile at %d,%d is saturated and not white in both images: it may hide a difference; "
+            "make darker images, or files of floats",
+            100 * worst, worst_x, worst_y);
 }

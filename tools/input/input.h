@@ -37,9 +37,11 @@ struct input {
     struct moments m;        /* of INPUT_VARIANCE M3 is 0, of INPUT_IMAGE n, M2, M3 are 0, until
                                 input_pair() */
     bool is_xyz;             /* CIE X, Y, Z instead of R, G, B */
-    unsigned char *censored; /* 1 per pixel: not 0 where nothing is known, or NULL */
+    unsigned char *censored; /* 1 per pixel, or NULL: bit c where channel c is saturated; after input_pair() of
+                                both sides: 7 where all channels of both are, 1 where any is, else 0 */
     double *rounding;        /* 3 per pixel: variance that rounding to a code has added, or NULL */
-    size_t num_censored;
+    size_t num_censored;     /* by input_pair() */
+    size_t num_white;        /* of these: all channels of both sides */
     /* Of INPUT_REPLICATES: shared_noise_factor(), by which input_pair() multiplies the variance; else 0. */
     double sharing;
     struct square_noise unlimited; /* squares that show there is no such factor; side 0: there is */
@@ -72,8 +74,8 @@ NODISCARD bool input_pair(struct input *a, struct input *b, bool independent, st
                           struct err *e);
 
 /* After compare_moments() on a pair: EQUIVALENT and NO DIFFERENCE FOUND become INCONCLUSIVE, with the reason, if more than
- * 5 % of the image or half of a reporting tile is censored; in the latter case nothing is detectable
- * in that tile, and mdb_tile says so. */
+ * 5 % of the image or half of a reporting tile is censored and not white on both sides; in the latter case nothing is
+ * detectable in that tile, and mdb_tile says so. */
 void input_limit(const struct input *a, int tile, struct comparison *c);
 
 #endif

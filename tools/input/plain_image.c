@@ -117,7 +117,7 @@ bool plain_image_take(const char *path, char side, const struct image_file *pic,
             out->rounding[i] = b.step * b.step / 12;
         }
         if (b.saturated && out->censored != NULL)
-            out->censored[i / 3] = 1;
+            out->censored[i / 3] |= (unsigned char)(1 << i % 3);
     }
     out->kind = INPUT_IMAGE;
     tell(path, pic, opt->curve, notes);

@@ -572,6 +572,26 @@ TEST(test_censored)
     assert_int_equal(compare_files(pa, pb, opt, &notes, &censored), VERDICT_INCONCLUSIVE);
     assert_int_equal(censored, 144);
     assert_true(has_note(&notes, "144 of 4096"));
+    /* A white background of both, here of the lower half, is equal as far as codes go and stops no verdict; a background of
+     * which one channel is white does, and so does the square again. */
+    static uint16_t white_a[3 * 64 * 64], white_b[3 * 64 * 64];
+    for (int i = 0; i < 3 * 64 * 64; i++) {
+        const bool square = i / 3 % 64 < 12 && i / 3 / 64 < 12;
+        white_a[i] = square ? 100 + i % 2 : i < 3 * 64 * 32 ? a[i] : 255;
+        white_b[i] = square ? 100 + i / 2 % 2 : i < 3 * 64 * 32 ? b[i] : 255;
+    }
+    odd_png(pa, 64, 64, 3, 8, white_a);
+    odd_png(pb, 64, 64, 3, 8, white_b);
+    assert_int_equal(compare_files(pa, pb, opt, &notes, &censored), VERDICT_EQUIVALENT);
+    assert_int_equal(censored, 64 * 32);
+    assert_int_equal(compare_files(pa, pb, no_margin, &notes, &censored), VERDICT_NOTHING_FOUND);
+    for (int i = 3 * 64 * 32; i < 3 * 64 * 64; i += 3)
+        white_b[i] = 200;
+    odd_png(pb, 64, 64, 3, 8, white_b);
+    assert_int_equal(compare_files(pa, pb, opt, &notes, &censored), VERDICT_INCONCLUSIVE);
+    assert_int_equal(censored, 64 * 32);
+    odd_png(pa, 64, 64, 3, 8, a);
+    odd_png(pb, 64, 64, 3, 8, b);
     /* Spread over the tiles: 128 more, 272 are 6.6 %. */
     for (int i = 0; i < 128; i++)
         b[3 * (64 * 20 + 17 * i % (64 * 40)) + 1] = 255;
