@@ -105,7 +105,10 @@ static bool blocks_make(const struct grid *d, struct blocks *g, struct err *e)
             total += b->num;
         }
     if (total < FEWEST)
-        return err_set(e, "too many pixels are saturated to tell the noise of the others");
+        return err_set(
+            e,
+            "too many pixels are saturated to tell the noise of the others: give darker images, or "
+            "files of floats");
     for (int y = 0; y < g->ny; y++)
         for (int x = 0; x < g->nx; x++) {
             struct block s = {0};
@@ -256,7 +259,9 @@ static bool lines(const struct grid *d, bool columns, double v, double factor, d
 
 static bool tell_too_few(struct err *e)
 {
-    return err_set(e, "too few pixels vary or are not saturated to tell their noise");
+    return err_set(
+        e, "too few pixels vary or are not saturated to tell their noise: give larger images, or "
+           "directories of at least 3 renders");
 }
 
 /* *factor: variance of means over squares, over that of independent pixels; *bound: an upper bound of it for
