@@ -6,15 +6,19 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 json_t *json_read(const char *path, size_t flags, json_error_t *why)
 {
+    struct stat st;
     FILE *f = fs_open(path);
-    if (f == NULL) {
+    if (f == NULL || fstat(fileno(f), &st) != 0 || S_ISDIR(st.st_mode)) {
         *why = (json_error_t){.line = -1, .column = -1};
-        snprintf(why->text, sizeof why->text, "unable to open %.60s%s: %s", path,
-                 strlen(path) > 60 ? "..." : "", strerror(errno));
+        snprintf(why->text, sizeof why->text, "cannot read: %s",
+                 strerror(f != NULL ? EISDIR : errno));
+        if (f != NULL)
+            fclose(f);
         return NULL;
     }
     json_t *root = json_loadf(f, flags, why);

@@ -84,6 +84,10 @@ static const char *format_of(const char *path, enum use use, double *size, struc
     } else if (n >= 3 && head[0] == 'P' && strchr("123456Ff", head[1]) != NULL &&
                isspace(head[2])) {
         format = "pnm";
+        if (toupper(head[1]) == 'F' && head[2] == '\r') {
+            format = NULL;
+            why = "the lines of its header end in CR LF, those of a PFM file in LF";
+        }
     }
     fclose(f);
     if (format == NULL)

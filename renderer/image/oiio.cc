@@ -42,6 +42,12 @@ template <typename F> bool guarded(char *why, size_t size, F &&f)
     return false;
 }
 
+// The library says nothing of a file in a Netpbm format that ends too early.
+std::string or_short(const std::string &reason)
+{
+    return reason.empty() ? "the file ends too early" : reason;
+}
+
 enum image_type type_of(OIIO::TypeDesc type)
 {
     return type == OIIO::TypeDesc::UINT8    ? IMAGE_INT8
@@ -133,7 +139,7 @@ bool read_image(struct library_image *p, float *data, char *why, size_t size)
         if (!p->in->read_image(0, 0, 0, spec.nchannels,
                                alike ? OIIO::TypeDesc::UNKNOWN : OIIO::TypeDesc::FLOAT,
                                convert ? static_cast<void *>(stored.data()) : data))
-            return "cannot read: " + p->in->geterror();
+            return "cannot read: " + or_short(p->in->geterror());
         const size_t row = size_t(spec.width) * size_t(spec.nchannels);
         for (size_t y = 0; convert && y < size_t(spec.height); y++)
             OIIO::convert_pixel_values(spec.format, &stored[y * row * spec.format.size()],

@@ -64,6 +64,7 @@ right "validate: one look of 16 samples, another with 64" grep -q '"n_a": 16.0' 
 right "validate: and a third with 256" test "$(grep -c '"n_a": \(64\|256\).0' "$tmp/report/results.json")" -gt 1
 expect "report: matrix" 0 "^| 33_sphere_light | [+-][0-9.]* ± [0-9.]*, [0-9.]* | [+-][0-9.]* ± [0-9.]*, [0-9.]* | [+-][0-9.]* ± [0-9.]*, [0-9.]* |$" \
     "$assay" report --matrix "$tmp/report/results.json"
+expect "report: a folder" 3 "$tmp: cannot read: Is a directory" "$assay" report "$tmp"
 
 # A rubric that counts samples, accepts what the starter code does wrong, and builds source trees.
 cat >"$tmp/counts.rubric" <<'END'

@@ -243,12 +243,10 @@ static bool fill(const char *dir, struct catalogue *c, const json_t *root, struc
 
 bool catalogue_read(const char *dir, struct catalogue *out, struct err *e)
 {
-    json_error_t why;
     *out = (struct catalogue){0};
-    const struct path path = fs_path("%s/manifest.json", dir);
-    json_t *root = json_read(path.s, JSON_REJECT_DUPLICATES, &why);
+    json_t *root = json_read_or_say(fs_path("%s/manifest.json", dir).s, e);
     if (root == NULL)
-        return err_set(e, "%s:%d: %s", path.s, why.line, why.text);
+        return false;
     bool ok = fill(dir, out, root, e);
     json_decref(root);
     if (!ok)

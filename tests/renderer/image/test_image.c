@@ -464,6 +464,11 @@ TEST(colours_are_linear)
     struct err e = {""};
     REFUSES(image_read(test_path("rgb.jpg"), &im, NULL, &e),
             "not an OpenEXR, Radiance, PNG or PFM");
+    test_write(test_path("short.pfm"), "PF\n2 2\n-1\n0123456789", 20);
+    REFUSES(image_read(test_path("short.pfm"), &im, NULL, &e),
+            "short.pfm: cannot read: the file ends too early");
+    test_write(test_path("windows.pfm"), "PF\r\n1 1\r\n-1\r\n0123456789ab", 25);
+    REFUSES(image_read(test_path("windows.pfm"), &im, NULL, &e), "header end in CR LF");
 }
 
 /* The place of every texel, among channels that are no colours. */
