@@ -701,10 +701,11 @@ cp reference/engines/mine.sh "$tmp/scaled.sh"
 sed -i "s|^exec pathtracer|exec $pathtracer|" "$tmp/scaled.sh"
 for case in "1.002 0 nothing wrong found" "1.02 1 none of the"; do
     read -r scale code words <<<"$case"
-    sed "s|{here}/mine.sh|$tmp/scaled.sh|; s|\"spp\": 32, \"replicates\": 64|\"spp\": 16, \"replicates\": 16, \"scale\": $scale|" reference/engines/mine.json >"$tmp/scaled.json"
-    "$assay" validate -q --only 12_point_plane --engine "$tmp/scaled.json" --out "$tmp/scaled" >"$tmp/out" 2>&1
+    sed "s|{here}/mine.sh|$tmp/scaled.sh|; s|\"point\"|&, \"area\"|; s|\"spp\": 32, \"replicates\": 64|\"spp\": 16, \"replicates\": 16, \"scale\": $scale|" reference/engines/mine.json >"$tmp/scaled.json"
+    "$assay" validate -q --only 12_point_plane --only 13_square_patch/mine:pathtracer --engine "$tmp/scaled.json" --out "$tmp/scaled" >"$tmp/out" 2>&1
     expect "diagnose: an engine whose images are $scale times ours" "$code" "$words" "$assay" diagnose "$tmp/scaled/results.json"
 done
+expect "diagnose: what the catalogue does not know" 1 "not looked at: 13_square_patch: it is DIFFERENT" "$assay" diagnose "$tmp/scaled/results.json"
 # Nor is it accused of a pixel filter that it declares, which shows at the edge of a cone of light.
 sed "s|^exec pathtracer|exec $pathtracer --filter gauss:0.5:2|" reference/engines/mine.sh >"$tmp/scaled.sh"
 sed "s|{here}/mine.sh|$tmp/scaled.sh|; s|\"point\"|&, \"spot\", \"falloff\"|; s|\"spp\": 32, \"replicates\": 64|\"spp\": 64, \"replicates\": 16, \"filter\": \"gauss:0.5:2\", \"shared_samples\": false|" \

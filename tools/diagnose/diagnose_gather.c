@@ -169,6 +169,33 @@ static void add_consistency(const json_t *results, struct observation *clue)
     }
 }
 
+static bool has_view_of(const struct catalogue *c, const char *scene)
+{
+    for (int i = 0; i < c->num_views; i++)
+        if (strcmp(c->view[i].scene, scene) == 0)
+            return true;
+    return false;
+}
+
+/* What is DIFFERENT and not in the catalogue: "nothing wrong found" does not speak of it. */
+static void add_scenes_without_view(const json_t *results, const struct catalogue *c,
+                                    const char *subject, json_t *skipped)
+{
+    static const char different[] = "DIFFERENT";
+    const char *last = "";
+    json_each(claim, json_object_get(results, "claims")) {
+        const char *scene = member_text(claim, "scene");
+        if (strcmp(member_text(claim, "a"), subject) != 0 || strcmp(scene, last) == 0 ||
+            strcmp(member_text(claim, "verdict"), different) != 0 ||
+            strcmp(member_text(claim, "expected"), different) == 0 || has_view_of(c, scene))
+            continue;
+        last = scene;
+        json_array_append_new(
+            skipped, json_pack("{ss,ss}", "view", scene, "reason",
+                               "it is DIFFERENT, but the catalogue of bugs has no view of it"));
+    }
+}
+
 bool diagnose_gather_results(const struct diagnose_gather_options *opt, const char *path,
                              struct observation *clue, int *num, json_t *skipped, struct err *e)
 {
@@ -189,7 +216,7 @@ bool diagnose_gather_results(const struct diagnose_gather_options *opt, const ch
         if (!ok)
             break;
         const struct judged_by judged = find_judged(results, path, v, subject);
-        bool there = judged.image[0] != '\0' || err_set(&why, "no image");
+        bool there = judged.image[0] != '\0' || err_set(&why, DIAGNOSE_NO_IMAGE);
         there = there && (is_ours || scene->convention[0] == '\0' ||
                           err_set(&why, "a convention may differ: %s", scene->convention));
         there =
@@ -207,6 +234,7 @@ bool diagnose_gather_results(const struct diagnose_gather_options *opt, const ch
                                   json_pack("{ss,ss}", "view", v->name, "reason", why.msg));
         }
     }
+    add_scenes_without_view(results, c, subject, skipped);
     json_decref(results);
     return ok && (*num > 0 ||
                   err_set(e, "%s: none of the scenes that the catalogue of bugs knows", path));

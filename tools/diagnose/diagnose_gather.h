@@ -23,10 +23,14 @@ NODISCARD bool diagnose_gather_program(const struct diagnose_gather_options *opt
                                        const char *program, struct observation *clue, int *num,
                                        struct err *e);
 
+/* The reason of a view that is skipped as its scene was not judged. */
+#define DIAGNOSE_NO_IMAGE "no image"
+
 /* From the images and claims of consistency in a results.json of `assay validate`; with --engine, from that engine's
  * images, of which only the means are compared with bugs, as its noise may rightly differ, and which may be off by the
  * claims' margins. Views without an image, or with one of another shape, are left out and appended to `skipped` as
- * {"view": , "reason": }. Fails if none is left. */
+ * {"view": , "reason": }, and so are scenes that are DIFFERENT and of which the catalogue has no view. Fails if no view
+ * is left. */
 NODISCARD bool diagnose_gather_results(const struct diagnose_gather_options *opt, const char *path,
                                        struct observation *clue, int *num, json_t *skipped,
                                        struct err *e);

@@ -1,8 +1,10 @@
 #include "diagnose_print.h"
 
+#include "diagnose_gather.h"
 #include "reference/base/json_node.h"
 
 #include <math.h>
+#include <string.h>
 
 enum { NEXT = 3 };
 /* Less than this share of the difference is not worth a look. */
@@ -83,6 +85,24 @@ static void print_next(FILE *f, const struct catalogue *c, const struct diagnosi
     }
 }
 
+/* Views of scenes that were not judged, often most of them, share a line. */
+static void print_skipped(FILE *f, const json_t *skipped)
+{
+    const char *between = "not looked at, as there is no image of them: ";
+    bool any = false;
+    json_each(s, skipped)
+        if (strcmp(member_text(s, "reason"), DIAGNOSE_NO_IMAGE) != 0)
+            fprintf(f, "not looked at: %s: %s\n", member_text(s, "view"), member_text(s, "reason"));
+    json_each(s, skipped) {
+        if (strcmp(member_text(s, "reason"), DIAGNOSE_NO_IMAGE) != 0)
+            continue;
+        fprintf(f, "%s%s", any ? ", " : between, member_text(s, "view"));
+        any = true;
+    }
+    if (any)
+        fputc('\n', f);
+}
+
 void diagnose_print(FILE *f, const struct catalogue *c, const struct observation *clue,
                     int num_clues, const struct diagnosis *d, const json_t *skipped)
 {
@@ -100,9 +120,7 @@ void diagnose_print(FILE *f, const struct catalogue *c, const struct observation
         print_views(f, c, clue, num_clues, &d->candidate[0]);
         print_next(f, c, d);
     }
-    json_each(s, skipped)
-        fprintf(f, "not looked at: %s: %s\n", json_string_value(json_object_get(s, "view")),
-                json_string_value(json_object_get(s, "reason")));
+    print_skipped(f, skipped);
 }
 
 static json_t *view_json(const struct catalogue *c, const struct observation *clue,

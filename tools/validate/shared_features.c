@@ -132,11 +132,26 @@ static int num_scenes(const struct traits *t)
     return num;
 }
 
+/* The one scene whose claims differ; NULL if there are more. */
+static const char *only_scene(const struct traits *t)
+{
+    const char *scene = NULL;
+    for (int i = 0; i < t->num_claims; i++) {
+        if (!t->claim[i].differs)
+            continue;
+        if (scene != NULL && strcmp(scene, t->claim[i].scene) != 0)
+            return NULL;
+        scene = t->claim[i].scene;
+    }
+    return scene;
+}
+
 static void tell(const struct traits *t, FILE *to)
 {
     struct place best[MOST_KEPT];
     find_places(t, best);
     const bool is_few = num_scenes(t) < FEW_SCENES;
+    const char *only = only_scene(t);
     if (best[0].bits == 0 && t->num_differ == t->num_claims && !is_few)
         fprintf(
             to,
@@ -146,7 +161,13 @@ static void tell(const struct traits *t, FILE *to)
     else if (best[0].bits == 0 && is_few)
         fprintf(to, "%d of %d claims differ; what these have in common shows in more scenes.",
                 t->num_differ, t->num_claims);
-    else if (best[0].bits == 0)
+    else if (best[0].bits == 0 && only != NULL) {
+        fprintf(to,
+                "Only %s differs, although scenes that agree have each thing that it has: look at "
+                "what it has together, and at what its description says.",
+                only);
+        return;
+    } else if (best[0].bits == 0)
         fprintf(
             to,
             "The %d claims that differ have nothing in common that the %d that agree lack: several "

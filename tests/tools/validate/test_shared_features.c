@@ -139,6 +139,8 @@ TEST(what_they_do_not_share_is_not)
     tell(every_third, "pathtracer", true, text, sizeof text);
     assert_non_null(strstr(text, "nothing in common"));
     assert_non_null(strstr(text, "several mistakes"));
+    tell(cornell_alone, "pathtracer", true, text, sizeof text);
+    assert_non_null(strstr(text, "Only 41_cornell differs"));
     tell(all, "pathtracer", true, text, sizeof text);
     assert_non_null(strstr(text, "Every claim differs"));
     tell(none, "pathtracer", true, text, sizeof text);
