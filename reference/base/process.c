@@ -304,7 +304,9 @@ static bool start(const struct process *p, const char *path, struct run *r, stru
     while (n < 0 && errno == EINTR);
     if (n != 0) {
         wait_for(r->child, &(int){0}, 0, NULL);
-        err_set(e, "%s: cannot run: %s", p->argv[0], strerror(failure));
+        err_set(e, "%s: cannot run: %s%s", p->argv[0], strerror(failure),
+                failure == ENOENT ? ": what its first line names (is there a Windows line end?)"
+                                  : "");
         goto fail;
     }
     close_if_open(&status[0]);

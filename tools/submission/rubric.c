@@ -531,13 +531,15 @@ bool rubric_read(const char *path, const struct suite *suite, int variant, struc
         if (s.rest[0] != '\0')
             read_statement(&s);
     }
-    bool failed = ferror(f) != 0;
+    const int failed = ferror(f) != 0 ? errno : 0; /* of the last line */
     out->variant = out->variants > 0 ? out->variant : 0;
     if (out->variants > 0 && !s.varies)
         rubric_mistake(m, s.line, "'variants', and no '{variant}' to be one");
     fclose(f);
-    if (failed || read > MAX_FILE)
-        return err_set(e, "%s: %s", path, failed ? "cannot read" : "more than 1 MiB");
+    if (failed != 0)
+        return err_set(e, "%s: cannot read: %s", path, strerror(failed));
+    if (read > MAX_FILE)
+        return err_set(e, "%s: more than 1 MiB", path);
     rubric_check_whole(out, suite, m);
     int kept = (int)(sizeof m->at / sizeof *m->at);
     qsort(m->at, (size_t)(m->num < kept ? m->num : kept), sizeof *m->at, by_line);
