@@ -169,30 +169,35 @@ static void add_consistency(const json_t *results, struct observation *clue)
     }
 }
 
-static bool has_view_of(const struct catalogue *c, const char *scene)
+static bool is_looked_at(const struct observation *clue, int num, const char *scene)
 {
-    for (int i = 0; i < c->num_views; i++)
-        if (strcmp(c->view[i].scene, scene) == 0)
+    for (int i = 0; i < num; i++)
+        if (strcmp(clue[i].view->scene, scene) == 0)
             return true;
     return false;
 }
 
-/* What is DIFFERENT and not in the catalogue: "nothing wrong found" does not speak of it. */
-static void add_scenes_without_view(const json_t *results, const struct catalogue *c,
-                                    const char *subject, json_t *skipped)
+/* What is DIFFERENT and not in the catalogue, or there with other options only: "nothing wrong found" does not speak of
+ * it. */
+static void add_scenes_without_view(const struct diagnose_gather_options *opt,
+                                    const json_t *results, const char *subject,
+                                    const struct observation *clue, int num, json_t *skipped)
 {
     static const char different[] = "DIFFERENT";
     const char *last = "";
     json_each(claim, json_object_get(results, "claims")) {
         const char *scene = member_text(claim, "scene");
+        const struct suite_scene *known = suite_find(opt->suite, scene);
         if (strcmp(member_text(claim, "a"), subject) != 0 || strcmp(scene, last) == 0 ||
             strcmp(member_text(claim, "verdict"), different) != 0 ||
-            strcmp(member_text(claim, "expected"), different) == 0 || has_view_of(c, scene))
+            strcmp(member_text(claim, "expected"), different) == 0 ||
+            is_looked_at(clue, num, scene) || (known != NULL && known->convention[0] != '\0'))
             continue;
         last = scene;
         json_array_append_new(
-            skipped, json_pack("{ss,ss}", "view", scene, "reason",
-                               "it is DIFFERENT, but the catalogue of bugs has no view of it"));
+            skipped,
+            json_pack("{ss,ss}", "view", scene, "reason",
+                      "it is DIFFERENT, but the catalogue of bugs has no such view of it"));
     }
 }
 
@@ -234,7 +239,7 @@ bool diagnose_gather_results(const struct diagnose_gather_options *opt, const ch
                                   json_pack("{ss,ss}", "view", v->name, "reason", why.msg));
         }
     }
-    add_scenes_without_view(results, c, subject, skipped);
+    add_scenes_without_view(opt, results, subject, clue, *num, skipped);
     json_decref(results);
     return ok && (*num > 0 ||
                   err_set(e, "%s: none of the scenes that the catalogue of bugs knows", path));

@@ -29,7 +29,7 @@ NODISCARD bool diagnose_gather_program(const struct diagnose_gather_options *opt
 /* From the images and claims of consistency in a results.json of `assay validate`; with --engine, from that engine's
  * images, of which only the means are compared with bugs, as its noise may rightly differ, and which may be off by the
  * claims' margins. Views without an image, or with one of another shape, are left out and appended to `skipped` as
- * {"view": , "reason": }, and so are scenes that are DIFFERENT and of which the catalogue has no view. Fails if no view
+ * {"view": , "reason": }, and so are scenes that are DIFFERENT and of which no view was looked at. Fails if no view
  * is left. */
 NODISCARD bool diagnose_gather_results(const struct diagnose_gather_options *opt, const char *path,
                                        struct observation *clue, int *num, json_t *skipped,
