@@ -68,12 +68,16 @@ bool image_write_png_texts(const char *path, int width, int height, const uint8_
     png_infop info = png != NULL ? png_create_info_struct(png) : NULL;
     bool ok = text != NULL && info != NULL &&
               write_to(png, info, file.f, width, height, rgb8, text, num_attrs);
+    const int wrong = !ok && ferror(file.f) != 0 ? errno : 0; /* libpng says "Write Error" */
     png_destroy_write_struct(&png, &info);
     free(text);
     if (ok && why.msg[0] == '\0')
         return out_commit(&file, e);
     out_abandon(&file);
-    return err_set(e, "%s: cannot write: %s", path, why.msg[0] != '\0' ? why.msg : "out of memory");
+    return err_set(e, "%s: cannot write: %s", path,
+                   wrong != 0           ? strerror(wrong)
+                   : why.msg[0] != '\0' ? why.msg
+                                        : "out of memory");
 }
 
 bool image_write_png(const char *path, int width, int height, const uint8_t *rgb8, struct err *e)
