@@ -82,6 +82,7 @@ student right
 student not_c && echo 'int x = ;' >>"$tmp/class/not_c/tiny.c"
 student usage 'TINY = fprintf(stderr, "tiny: invalid option\nUsage: tiny [options]\n"); return 1;'
 student crash 'TINY = abort();'
+student no_return $'TINY = abort();\nCC = cc -Wreturn-type' && echo 'int value(void) { }' >>"$tmp/class/no_return/tiny.c"
 student hang 'TINY = pause();'
 student hangs_once 'TINY = if (strstr(argv[argc - 1], "furnace")) pause();'
 student late 'TINY = atexit(abort);'
@@ -133,6 +134,7 @@ expect "what goes wrong is staff's to look at" 2 "the shared library" grade make
 said make not_c not_built 'It does not build: tiny.c:[0-9:]* error: expected expression'
 said make usage usage 'It prints its usage text for every image: tiny: invalid option'
 said make crash not_started 'No run of it made an image: the program: killed by signal 6'
+said make no_return not_started 'killed by signal 6.*; its build warned: tiny.c:.* non-void function'
 said make lost not_started 'It does not start: the shared library liblevel.so is missing'
 said make other not_started 'It does not start: building it made no tiny, but other'
 said make hog not_built 'It does not build: .*300 MiB of memory'
@@ -154,6 +156,10 @@ tell "the class page says what is wrong" "$(grep -q 'the shared library liblevel
 tell "a build's log is kept" "$(grep -q 'expected expression' "$tmp/make/not_c/$(field make not_c build_log)" || echo it is not)"
 expect "archives" 0 "4.00 of 6" grade cmake "$tmp/cmake.rubric" "$tmp/zipped.zip" "$tmp/packed.tar.gz" "$tmp/inside" "$tmp/class/right"
 for name in zipped packed inside right; do points cmake $name 4.0; done
+# CMake says over several lines what is wrong; a submodule that was not handed in is an empty folder.
+cp -R "$tmp/tree" "$tmp/submodule" && mkdir "$tmp/submodule/CGL" && echo 'add_subdirectory(CGL)' >>"$tmp/submodule/CMakeLists.txt"
+expect "a submodule is missing" 2 "does not build" grade cmake "$tmp/cmake.rubric" "$tmp/submodule"
+said cmake submodule not_built 'add_subdirectory): The source directory /box/CGL does not contain a CMakeLists.txt file.$'
 
 # Programs handed in without sources are not built.
 cp -R "$tmp/tree" "$tmp/made" && make -sC "$tmp/made" && mkdir "$tmp/built" && cp "$tmp/made"/{tiny,liblevel.so} "$tmp/built"

@@ -116,7 +116,8 @@ bool collect_images(const struct collect *c, struct submitted_images *h, struct 
         if (!make_image(c, &r->image[i], &h->made[i], &h->image[i], h->why[i], e))
             return false;
     }
-    submission_conclude(r, h->made, h->why, c->submission);
+    const struct path build_log = fs_path("%s/build.log", c->out);
+    submission_conclude(r, h->made, h->why, build_log.s, c->submission);
     refuse_repeated(r, h);
     return true;
 }

@@ -95,9 +95,10 @@ bool submission_will_hang(const struct rubric *r, const struct made *made, int i
 bool submission_printed_usage(const char *log, char *why, size_t size);
 
 /* After all images: if none could be read, says so once, in s->why, and in s->state if none was made. why: of each
- * image; if all have the same reason, those that were not made then refer to s->why. */
+ * image; if all have the same reason, those that were not made then refer to s->why.
+ * build_log: of what was built, or no file; a warning in it that explains a crash is told. */
 void submission_conclude(const struct rubric *r, const struct made *made, char (*why)[400],
-                         struct submission *s);
+                         const char *build_log, struct submission *s);
 
 /* The command of an image as NULL-terminated words, which lie in `text` (size bytes), at most most
  * - 1 of them; threads and seed as given, the output by its name in the rubric. False if it is too

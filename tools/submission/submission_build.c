@@ -124,24 +124,27 @@ static void reason_in(const char *log, bool first_error, char *out, size_t size)
                                         "No rule to make", "cannot find ", "ut of memory",
                                         "annot allocate"};
     char line[400];
-    int more = 0; /* lines still to append: CMake says what, then why */
+    bool more = false; /* CMake says what, then, indented, why */
     out[0] = '\0';
     FILE *f = fopen(log, "r");
     while (f != NULL && fgets(line, sizeof line, f) != NULL) {
+        const bool indented = line[0] == ' ';
         size_t n = 0;
         for (const char *c = line + strspn(line, " \t"); *c != '\0' && *c != '\n'; c++)
             line[n++] = *c >= ' ' && *c <= '~' ? *c : '?';
         line[n] = '\0';
         if (n == 0)
             continue;
+        if (more && !indented)
+            break;
         bool error = false;
         for (size_t i = 0; first_error && i < sizeof words / sizeof *words; i++)
             error = error || strstr(line, words[i]) != NULL;
-        size_t used = more > 0 ? strlen(out) : 0;
+        size_t used = more ? strlen(out) : 0;
         snprintf(out + used, size - used, "%s%s", used > 0 ? " " : "", line);
-        if (more == 1 || (more == 0 && error && strncmp(line, words[1], strlen(words[1])) != 0))
+        more = more || (error && strncmp(line, words[1], strlen(words[1])) == 0);
+        if (error && !more)
             break;
-        more = more > 0 ? more - 1 : error ? 1 : 0;
     }
     if (f != NULL)
         fclose(f);

@@ -2,6 +2,8 @@
  * images are not worth a try. */
 #include "submission.h"
 
+#include "tools/base/text.h"
+
 #include <ctype.h>
 #include <stdio.h>
 #include <string.h>
@@ -76,9 +78,25 @@ bool submission_printed_usage(const char *log, char *why, size_t size)
     return usage;
 }
 
-void submission_conclude(const struct rubric *r, const struct made *made, char (*why)[400],
-                         struct submission *s)
+/* What a compiler warned of a function that ends without returning a value: what the program then does depends on
+ * the compiler, and a student's own may have been kinder. */
+static void missing_return(const char *log, char *out, size_t size)
 {
+    char line[512];
+    out[0] = '\0';
+    FILE *f = fopen(log, "r");
+    while (f != NULL && out[0] == '\0' && fgets(line, sizeof line, f) != NULL)
+        if (strstr(line, "warning: ") != NULL && (strstr(line, "non-void function") != NULL ||
+                                                  strstr(line, "returning non-void") != NULL))
+            take_line(line, out, size);
+    if (f != NULL)
+        fclose(f);
+}
+
+void submission_conclude(const struct rubric *r, const struct made *made, char (*why)[400],
+                         const char *build_log, struct submission *s)
+{
+    char warned[200];
     bool usage = true, same = true, any = s->kind == SUBMISSION_IMAGES;
     for (int i = 0; i < r->num_images; i++) {
         if (why[i][0] == '\0' || s->state != SUBMISSION_GRADED)
@@ -95,6 +113,9 @@ void submission_conclude(const struct rubric *r, const struct made *made, char (
     const char *text = usage ? strchr(why[0], ':') + 2 : why[0];
     snprintf(s->why, sizeof s->why, "%s: %s%s%s%.400s", what, same ? "" : "'",
              same ? "" : r->image[0].name, same ? "" : "': ", text);
+    missing_return(build_log, warned, sizeof warned);
+    if (s->state == SUBMISSION_NOT_STARTED && warned[0] != '\0')
+        text_append(s->why, sizeof s->why, "; its build warned: %s", warned);
     for (int i = 0; same && i < r->num_images; i++)
         if (made[i].path[0] == '\0')
             snprintf(why[i], sizeof why[i], "%s", submission_not_made);
