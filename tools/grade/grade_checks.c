@@ -216,15 +216,6 @@ static bool moved(const struct submitted_image *q, const struct moments *to,
     return ok;
 }
 
-/* Black, as far as its codes can tell. */
-static bool is_black(const struct submitted_image *s)
-{
-    for (size_t i = 0; i < 3 * (size_t)s->width * (size_t)s->height; i++)
-        if (s->mean[i] > s->tolerance[i])
-            return false;
-    return true;
-}
-
 static bool check_agree(struct judging *w, struct result *out, struct err *e)
 {
     const struct moments *m = judging_reference(w, 0), *n = judging_reference(w, 1);
@@ -237,7 +228,7 @@ static bool check_agree(struct judging *w, struct result *out, struct err *e)
     if (strcmp(judging_student(w, 0)->sha256, judging_student(w, 1)->sha256) == 0) {
         snprintf(
             out->seen, sizeof out->seen, "%s",
-            is_black(judging_student(w, 0))
+            submitted_image_is_black(judging_student(w, 0))
                 ? "both images are black"
                 : "the two files are the same: the option that tells them apart has no effect");
         return true;

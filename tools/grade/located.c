@@ -85,7 +85,7 @@ struct located located_by(const struct grading *g, const double *share)
     enum state state[RUBRIC_IMAGES] = {NOT_KNOWN};
     bool holds[NUM_FACTS_HERE], here[NUM_FACTS_HERE];
     struct located out = {.image = -1};
-    int right = 0, wrong = 0;
+    int right = 0, wrong = 0, black = 0;
     memset(holds, true, sizeof holds);
     find_states(g->r, g->h, share, state);
     for (int i = 0; i < g->r->num_images; i++) {
@@ -93,6 +93,7 @@ struct located located_by(const struct grading *g, const double *share)
             continue;
         right += state[i] == RIGHT;
         wrong += state[i] == WRONG;
+        black += submitted_image_is_black(&g->h->image[i]);
         out.image = state[i] == WRONG && out.image < 0 ? i : out.image;
         char *scene = read_scene(g->r, &g->r->image[i]);
         if (scene != NULL)
@@ -107,8 +108,12 @@ struct located located_by(const struct grading *g, const double *share)
         if (holds[f])
             snprintf(out.text, sizeof out.text, "%s", facts[f]);
     if (right == 0)
-        snprintf(out.text, sizeof out.text,
-                 "in every image: the camera, the geometry, the lights or the files themselves");
+        snprintf(
+            out.text, sizeof out.text, "%s",
+            black == wrong
+                ? "in every image, and all are black: rays hit nothing, or a variable is "
+                  "used before it is set"
+                : "in every image: the camera, the geometry, the lights or the files themselves");
     else if (out.text[0] == '\0')
         snprintf(out.text, sizeof out.text, "in %d of %d images, '%.47s' the first of them", wrong,
                  right + wrong, g->r->image[out.image].name);

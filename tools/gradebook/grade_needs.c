@@ -8,7 +8,7 @@
 static const struct {
     const char *name, *words;
 } states[] = {
-    {"not_built", "not built"}, {"not_started", "did not start"}, {"usage", "printed its usage"}};
+    {"not_built", "not built"}, {"not_started", "no image"}, {"usage", "printed its usage"}};
 
 static bool made_an_image(const json_t *grade)
 {

@@ -8,8 +8,7 @@
 
 /* Does a grade (tools/docs/formats/grades.md) need staff? text: a line that says why, or "". */
 bool grade_needs(const json_t *grade, char *text, size_t size);
-/* What is wrong with all of it, in two words: "not graded", "not built", "did not start", "printed its usage", "no image"; NULL where
- * nothing is. */
+/* What is wrong with all of it, in two words: "not graded", "not built", "printed its usage", "no image"; NULL where nothing is. */
 const char *grade_state(const json_t *grade);
 /* Is a check, or any check of a grade, provisional? Its points are kept until staff have looked. */
 bool grade_is_provisional(const json_t *object);

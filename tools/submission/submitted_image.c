@@ -207,6 +207,14 @@ bool submitted_image_add_run(struct submitted_image *s, struct submitted_image *
     return true;
 }
 
+bool submitted_image_is_black(const struct submitted_image *s)
+{
+    for (size_t i = 0; i < 3 * (size_t)s->width * (size_t)s->height; i++)
+        if (s->mean[i] > s->tolerance[i])
+            return false;
+    return true;
+}
+
 bool submitted_image_same(const struct submitted_image *a, const struct submitted_image *b)
 {
     return a->width == b->width && a->height == b->height &&

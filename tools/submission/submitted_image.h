@@ -44,6 +44,8 @@ void submitted_image_free(struct submitted_image *s);
 NODISCARD bool submitted_image_add_run(struct submitted_image *s, struct submitted_image *more,
                                        struct err *e);
 
+/* Is it black, as far as its codes can tell? */
+bool submitted_image_is_black(const struct submitted_image *s);
 /* Are they the same values, pixel by pixel? */
 bool submitted_image_same(const struct submitted_image *a, const struct submitted_image *b);
 

@@ -315,6 +315,18 @@ static struct submitted_images *hand_in_same(int like, uint8_t level)
     return h;
 }
 
+/* White ones are the control. */
+TEST(where_all_images_are_black_that_is_said)
+{
+    for (int white = 0; white < 2; white++) {
+        struct submitted_images *h = hand_in_same(-1, white ? 255 : 0);
+        struct outcome v = grade(h);
+        bug_images_take_back(&of, h);
+        assert_non_null(strstr(v.mistake.located.text, "in every image"));
+        assert_true((strstr(v.mistake.located.text, "all are black") == NULL) == white);
+    }
+}
+
 /* An unknown mistake of Part 2 and a known one of Part 4: no bug explains all images, those of Part 4 one does; it explains those
  * of Part 5 as well, but is no bug of that. Black images (without direct light, unknown, too) are explained by several bugs. */
 TEST(a_part_is_named_by_itself)

@@ -42,7 +42,7 @@ TEST(each_reason_is_said)
     expect(with("trouble", json_string("no space left")), "not graded", "no space left");
     expect(with("wrong", json_string("two main()")), "", "two main()");
     expect(with("state", json_string("not_built")), "not built", "not built");
-    expect(with("state", json_string("not_started")), "did not start", "did not start");
+    expect(with("state", json_string("not_started")), "no image", "no image");
     expect(with("state", json_string("usage")), "printed its usage", "printed its usage");
     expect(with("flag", json_string("images alone")), "", "images alone");
     expect(with("pictures", json_pack("[{sn}]", "sha256")), "no image", "no image");
