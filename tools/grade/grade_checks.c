@@ -216,6 +216,32 @@ static bool moved(const struct submitted_image *q, const struct moments *to,
     return ok;
 }
 
+/* Do they differ in bounces alone? */
+static bool differ_in_bounces(const struct rubric_image *p, const struct rubric_image *q)
+{
+    return p->bounces != q->bounces && p->spp == q->spp && p->lights == q->lights &&
+           p->width == q->width && p->height == q->height && strcmp(p->scene, q->scene) == 0 &&
+           strcmp(p->environment, q->environment) == 0 && strcmp(p->options, q->options) == 0;
+}
+
+/* May two images be the same file? A program that traces one bounce more than it is asked for draws the same numbers
+ * where no bounce adds anything: it may, if it makes two other images of those that differ in bounces alone, neither
+ * black. */
+static bool may_be_the_same(const struct judging *w)
+{
+    const struct rubric *r = w->g->r;
+    const struct submitted_image *image = w->g->h->image;
+    if (!differ_in_bounces(judging_image(w, 0), judging_image(w, 1)))
+        return false;
+    for (int i = 0; i < r->num_images; i++)
+        for (int k = 0; k < i; k++)
+            if (differ_in_bounces(&r->image[i], &r->image[k]) && image[i].mean != NULL &&
+                image[k].mean != NULL && strcmp(image[i].sha256, image[k].sha256) != 0 &&
+                !submitted_image_is_black(&image[i]) && !submitted_image_is_black(&image[k]))
+                return true;
+    return false;
+}
+
 static bool check_agree(struct judging *w, struct result *out, struct err *e)
 {
     const struct moments *m = judging_reference(w, 0), *n = judging_reference(w, 1);
@@ -225,12 +251,13 @@ static bool check_agree(struct judging *w, struct result *out, struct err *e)
              judging_image(w, 1)->name,
              deviates ? "differ as in our renders with the same deviation" : "have the same mean",
              100 * w->check->image.full, 100 * w->check->tile.full);
-    if (strcmp(judging_student(w, 0)->sha256, judging_student(w, 1)->sha256) == 0) {
+    const bool black = submitted_image_is_black(judging_student(w, 0));
+    if (strcmp(judging_student(w, 0)->sha256, judging_student(w, 1)->sha256) == 0 &&
+        (black || !may_be_the_same(w))) {
         snprintf(
             out->seen, sizeof out->seen, "%s",
-            submitted_image_is_black(judging_student(w, 0))
-                ? "both images are black"
-                : "the two files are the same: the option that tells them apart has no effect");
+            black ? "both images are black"
+                  : "the two files are the same: the option that tells them apart has no effect");
         return true;
     }
     return judging_find_usable(w, out, e) &&
