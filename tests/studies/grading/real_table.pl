@@ -1,6 +1,7 @@
 #!/usr/bin/perl
 # real_table.pl TABLE GRADES: the programs of real_programs.txt that have been graded, as Markdown: points lost by part, what was named and
-# located, and whether that is what stands in the table. Exits 1 if a right program lost points or a wrong name was told.
+# located, whether that is what stands in the table, and the commit of the assay that graded it. Exits 1 if a right program lost points
+# or a wrong name was told.
 use strict;
 use warnings;
 use JSON::PP;
@@ -52,12 +53,13 @@ for my $row (@rows) {
     $c->{held_only}++ if $row->{held} && $only;
     $c->{cpu} += $g->{cpu_s} // 0;
     my $as_it_is = $row->{kind} eq 'right' ? (%lost ? '**no**' : 'yes') : !%lost ? '**none lost**' : $only ? ($all || $row->{kind} eq 'bug' ? 'yes' : 'yes, not of both') : '**no**';
-    push @lines, sprintf "| %s%s | %s | %s | %s | %s | %s | %s | %s | %.0f |\n", $row->{id}, $row->{held} ? ' (held)' : '', $row->{what}, join(', ', @{ $row->{parts} }),
+    my ($commit) = ($g->{version} // '') =~ /commit (\w{8})/;
+    push @lines, sprintf "| %s%s | %s | %s | %s | %s | %s | %s | %s | %.0f | %s |\n", $row->{id}, $row->{held} ? ' (held)' : '', $row->{what}, join(', ', @{ $row->{parts} }),
         join(', ', map { sprintf '%s: %.3g of %g', $_, $lost{$_}, $parts{$_} } sort keys %lost) || 'none', $as_it_is,
         ($wrong ? '**wrong:** ' : '') . (join(' or ', map { join ' and ', @$_ } @found) || ($named ? '' : '')) . ($named ? ' (right)' : ''),
-        $g->{located} // '', $g->{provisional} ? 'yes' : '', $g->{cpu_s} // 0;
+        $g->{located} // '', $g->{provisional} ? 'yes' : '', $g->{cpu_s} // 0, $commit // '';
 }
-print "| program | what it is | part | points lost | as it is | named | located | provisional | CPU s |\n|---|---|---|---|---|---|---|---|--:|\n", @lines, "\n";
+print "| program | what it is | part | points lost | as it is | named | located | provisional | CPU s | graded by |\n|---|---|---|---|---|---|---|---|--:|---|\n", @lines, "\n";
 for my $kind (qw(right bug pair drawn)) {
     my $c = $of{$kind} or next;
     my $n = sub { $c->{ $_[0] } // 0 };
