@@ -16,14 +16,13 @@ size_t line_noise_squares(const double *sum, const double *variance, size_t n, d
 double line_noise_ratio(double *square, size_t num, double *dof);
 
 /* Lines of which each begins the same stream of random numbers (a generator seeded for each row, with one seed) share
- * noise where they begin, and ever less further on: sums of whole lines show that late. Looks at blocks of 8 x 4 values
- * of `num` images of width x height, one after the other, and at strips 4 wide along the borders: there, do the values
- * of one column, less the mean of 8 beside them in their row, agree from row to row? Turning the signs of a whole row
- * makes the sum over a block of the products of rows, over the root of the sum of their squares, a variable of mean 0 and
- * variance 1 whatever the law; 4 standard deviations of the sum over all blocks, or
- * 3.5 of that over a strip, are asked for. A difference of the
- * images cancels but for its edges, and blocks in which hardly any value has the other sign are left out, as there is no
- * noise; where rows and columns both agree it is taken for a difference, or for a filter. */
+ * noise where they begin, and ever less further on: sums of whole lines show that late. Looks at blocks of 8 x 4 values of
+ * `num` images of width x height, one after the other, and at strips 4 wide along the borders: there, do the values of one
+ * column, less the mean of 8 beside them in their row, agree from row to row? Turning the signs of a whole row makes the
+ * sum over a block of the products of rows, over the root of the sum of their squares, a variable of mean 0 and variance 1
+ * whatever the law; 4 standard deviations of the sum over all blocks, or 3.5 of that over a strip, are asked for. A
+ * difference of the images cancels but for its edges, and blocks in which hardly any value has the other sign are left
+ * out, as there is no noise; where rows and columns both agree it is taken for a difference, or for a filter. */
 bool line_noise_begins_alike(const double *v, int num, int width, int height);
 
 #endif
