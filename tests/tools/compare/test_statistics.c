@@ -293,6 +293,38 @@ TEST(test_names)
     }
 }
 
+/* The three exchanges that a wide image can have, 32 x 24: each is named in 5 of 5 claims; the control, without any, is
+ * not DIFFERENT. */
+TEST(test_names_in_wide_images)
+{
+    struct err e;
+    enum { WIDE = 32, HIGH = 24, N = 64, CLAIMS = 5 };
+    static const char *const name[4] = {"looks like left and right exchanged",
+                                        "looks like top and bottom exchanged",
+                                        "looks like turned by 180 degrees", NULL};
+    static double truth[3 * WIDE * WIDE], wrong[3 * WIDE * HIGH];
+    OWN(moments) a = new_moments(WIDE, HIGH, "sample"), b = new_moments(WIDE, HIGH, "sample");
+    uint64_t seed = 72;
+    fill_scene(truth, WIDE, 1); /* its upper rows are taken */
+    for (int kind = 0; kind < 4; kind++) {
+        for (int i = 0; i < 3 * WIDE * HIGH; i++) {
+            const int x = i / 3 % WIDE, y = i / 3 / WIDE;
+            const int from_x = kind == 0 || kind == 2 ? WIDE - 1 - x : x;
+            const int from_y = kind == 1 || kind == 2 ? HIGH - 1 - y : y;
+            wrong[i] = truth[3 * (from_y * WIDE + from_x) + i % 3];
+        }
+        for (int i = 0; i < CLAIMS; i++) {
+            render(&a, LAW_NORMAL, wrong, N, true, &seed);
+            render(&b, LAW_NORMAL, truth, N, true, &seed);
+            OWN(comparison) c = compare(&a, &b, (struct compare_options){.alpha = 1e-3, .tile = 8});
+            MUST(hint_add(&a, &b, 1, &c, &e));
+            assert_true((c.verdict == VERDICT_DIFFERENT) == (name[kind] != NULL));
+            if (name[kind] != NULL)
+                assert_non_null(strstr(c.reason, name[kind]));
+        }
+    }
+}
+
 /* Columns 1 + 0.8 sin(k x), k = 2 pi/16, moved by half a pixel: halfway between two pixels of B, which lie as far from
  * it on either side, so that by symmetry half a pixel is what leaves least. Scale: 3 % is 3 %, and so for an offset of
  * 3 % of the mean. In 400 claims each has its name in 95 % at least, and the mean of its amounts is that within 4
