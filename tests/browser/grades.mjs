@@ -71,7 +71,7 @@ const text = async (path, what) => {
   return texts;
 };
 const [top] = await text("index.html", ".error-line"), rows = await text("index.html", "tbody th a:first-child");
-const needy = { cyd: "not built", dan: "did not start", eve: "printed its usage", fay: "provisional", gus: "look" };
+const needy = { cyd: "not built", dan: "no image", eve: "printed its usage", fay: "provisional", gus: "look" };
 check("the line on top", top.startsWith("5 of 7 need you") && Object.entries(needy).every(([id, why]) => top.includes(`${id} (${why})`)), top);
 check("they come first", rows.filter((t) => t.length === 3).slice(0, 5).sort().join() === Object.keys(needy).join(), rows.join());
 check("what changed", (await text("index.html", "li")).some((t) => t === "gus: 1.50 of 10, 4.00 of 10 before; point 4.00, now 1.50"));

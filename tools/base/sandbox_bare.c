@@ -210,9 +210,11 @@ static bool hand_out_tree(struct bare *b, struct err *e)
          as_user(b, "rm -rf ./scene; exec tar -cSf - .", "", b->job->limit.disk, -1, out, &done, e);
     if (out >= 0)
         close(out);
-    if (!done) /* it is too large */
+    /* Asked first: what is removed makes room. */
+    ok = ok && (done || has_room(b, e));
+    if (!done) /* it is too large, or there is no room for it */
         unlink(to.s);
-    return ok && (done || has_room(b, e));
+    return ok;
 }
 
 static bool run_made(struct bare *b, struct sandbox_result *r, struct err *e)
