@@ -53,7 +53,7 @@ install: all library
 	install -m 644 tools/docs/formats/*.schema.json $(share)
 	cp -R reference/scenes reference/engines reference/starter golden tools/rubrics $(share)
 	chmod -R u=rwX,go=rX $(share)
-# So that the loader finds the library in a directory that it looks into, as the default's.
+# Otherwise the loader does not find the library at once, even where it looks, as in /usr/local/lib.
 	test -n "$(DESTDIR)" || test "$$(id -u)" != 0 || PATH="$$PATH:/sbin" ldconfig || true
 
 .PHONY: library autograder deb install

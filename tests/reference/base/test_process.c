@@ -138,9 +138,10 @@ TEST(a_program_that_cannot_be_executed_says_why)
     struct err e;
     const char *const argv[] = {path, NULL};
     assert_false(process_run(&(struct process){.argv = argv}, NULL, &e));
-    snprintf(want, sizeof want, "%s: cannot run: %s: what its first line names", path,
+    snprintf(want, sizeof want,
+             "%s: cannot run: %s: what its first line names (is there a Windows line end?)", path,
              strerror(ENOENT));
-    assert_memory_equal(e.msg, want, strlen(want));
+    assert_string_equal(e.msg, want);
 }
 
 /* The shell ignores SIGTERM and so does what it started: only SIGKILL to the group ends them. */
