@@ -15,6 +15,7 @@
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -71,24 +72,29 @@ bool process_find_or_say(const char *argv0, char *path, size_t size, struct err 
     return err_set(e, "%s: no such program%s", argv0, is_path ? "" : " in PATH");
 }
 
-/* The guard is a process that leads the process group. If its parent dies for any reason, even by
- * SIGKILL, the kernel sends the guard SIGUSR1, and the guard kills the group. It also keeps the
- * group's id from being reused until we have killed the group. Only async-signal-safe calls, since
- * the parent may have threads. */
-static _Noreturn void guard_main(pid_t parent)
+/* ThreadSanitizer would attribute the accesses of a process that shares our memory to us. */
+#ifdef __SANITIZE_THREAD__
+#define IN_OUR_MEMORY 0
+#else
+#define IN_OUR_MEMORY CLONE_VM
+#endif
+
+/* The guard is a process that leads the process group. If its parent dies, even by SIGKILL, the kernel sends the guard
+ * SIGUSR1, and the guard kills the group. It also keeps the group's id from being reused until we have killed the group.
+ * It shares our memory, as a copy takes longer the more we have, and with it our thread's errno, which only calls that
+ * fail write: the one that waits fails where the group is stopped and goes on. */
+__attribute__((no_sanitize("address"))) static int guard_main(void *parent)
 {
-    sigset_t all, wake;
-    sigfillset(&all);
-    sigprocmask(SIG_SETMASK, &all, NULL);
+    sigset_t wake;
     if (setpgid(0, 0) != 0)
         _exit(1);
     close_range(0, ~0U, 0);
     prctl(PR_SET_PDEATHSIG, SIGUSR1);
     sigemptyset(&wake);
     sigaddset(&wake, SIGUSR1);
-    int sig;
-    if (getppid() == parent)
-        sigwait(&wake, &sig);
+    while (getppid() == *(const pid_t *)parent &&
+           syscall(SYS_rt_sigtimedwait, &wake, NULL, NULL, _NSIG / 8) < 0)
+        ;
     kill(0, SIGKILL);
     _exit(1);
 }
@@ -112,6 +118,8 @@ __attribute__((no_sanitize("address"))) static int child_main(void *arg)
     sigset_t none;
     sigemptyset(&none);
     sigprocmask(SIG_SETMASK, &none, NULL);
+    /* Where memory runs out, the kernel kills all processes that share ours: the guard, too. */
+    prctl(PR_SET_PDEATHSIG, SIGKILL);
     /* Move the descriptors above 2 first: the parent may have been started with stdin, stdout or stderr closed. */
     const int status = fcntl(c->status, F_DUPFD_CLOEXEC, 3),
               out = fcntl(c->out, F_DUPFD_CLOEXEC, 3);
@@ -125,28 +133,23 @@ __attribute__((no_sanitize("address"))) static int child_main(void *arg)
     _exit(127);
 }
 
-/* ThreadSanitizer would attribute a child's accesses to shared memory to us. */
-#ifdef __SANITIZE_THREAD__
-#define IN_OUR_MEMORY 0
-#else
-#define IN_OUR_MEMORY (CLONE_VM | CLONE_VFORK)
-#endif
-
-/* fork() with signals blocked, so that no signal handler of ours runs in the child. With `c`, a clone() that shares our
- * memory until exec, as copying takes longer the more memory we have; not with c->p->before, which might change that
- * memory. */
-static pid_t fork_blocked(struct child *c)
+/* clone() with all signals blocked, so that no signal handler of ours runs in the new process. */
+static pid_t clone_blocked(int (*main)(void *), void *arg, char *stack_end, int flags)
 {
-    _Alignas(64) char stack[1 << 16];
     sigset_t all, old;
     sigfillset(&all);
     pthread_sigmask(SIG_SETMASK, &all, &old);
-    pid_t pid = c == NULL ? fork()
-                          : clone(child_main, stack + sizeof stack,
-                                  SIGCHLD | (c->p->before == NULL ? IN_OUR_MEMORY : 0), c);
-    if (pid != 0)
-        pthread_sigmask(SIG_SETMASK, &old, NULL);
+    const pid_t pid = clone(main, stack_end, SIGCHLD | flags, arg);
+    pthread_sigmask(SIG_SETMASK, &old, NULL);
     return pid;
+}
+
+/* Shares our memory until exec; not with p->before, which might change that memory. */
+static pid_t start_child(struct child *c)
+{
+    _Alignas(64) char stack[1 << 16];
+    const bool shares = c->p->before == NULL && IN_OUR_MEMORY;
+    return clone_blocked(child_main, c, stack + sizeof stack, shares ? CLONE_VM | CLONE_VFORK : 0);
 }
 
 static void close_if_open(int *fd)
@@ -211,8 +214,9 @@ static void tail_quote(const struct tail *t, char out[LAST_CHARS + 8])
 
 /* A running program as the loop below sees it. */
 struct run {
-    pid_t guard, child;
-    int out, log; /* -1: closed */
+    pid_t parent, guard, child;
+    _Alignas(64) char guard_stack[1 << 14];
+    int out, log, end; /* -1: closed; end: readable when the child has ended */
     size_t logged, log_most;
     bool log_full, clean;
     int log_errno; /* of the first failed write */
@@ -279,10 +283,9 @@ static void drain(struct run *r)
 static bool start(const struct process *p, const char *path, struct run *r, struct err *e)
 {
     int out[2] = {-1, -1}, status[2] = {-1, -1};
-    pid_t parent = getpid();
-    r->guard = fork_blocked(NULL);
-    if (r->guard == 0)
-        guard_main(parent);
+    r->parent = getpid();
+    r->guard = clone_blocked(guard_main, &r->parent, r->guard_stack + sizeof r->guard_stack,
+                             IN_OUR_MEMORY);
     if (r->guard < 0)
         return err_set(e, "%s: cannot fork: %s", p->argv[0], strerror(errno));
     setpgid(r->guard, r->guard);
@@ -290,7 +293,7 @@ static bool start(const struct process *p, const char *path, struct run *r, stru
         err_set(e, "%s: cannot make a pipe: %s", p->argv[0], strerror(errno));
         goto fail;
     }
-    r->child = fork_blocked(&(struct child){p, path, r->guard, out[1], status[1]});
+    r->child = start_child(&(struct child){p, path, r->guard, out[1], status[1]});
     if (r->child < 0) {
         err_set(e, "%s: cannot fork: %s", p->argv[0], strerror(errno));
         goto fail;
@@ -312,6 +315,7 @@ static bool start(const struct process *p, const char *path, struct run *r, stru
     close_if_open(&status[0]);
     r->out = out[0];
     fcntl(r->out, F_SETFL, O_NONBLOCK);
+    r->end = (int)syscall(SYS_pidfd_open, r->child, 0);
     return true;
 fail:
     for (int i = 0; i < 2; i++) {
@@ -330,8 +334,8 @@ static bool watch(const struct process *p, struct run *r, double t0, int *status
     bool late = false;
     double kill_at = 0, ticked = t0;
     for (;;) {
-        struct pollfd pfd = {.fd = r->out, .events = POLLIN};
-        poll(&pfd, 1, r->out >= 0 ? POLL_MS : POLL_MS / 10);
+        struct pollfd fds[] = {{.fd = r->out, .events = POLLIN}, {.fd = r->end, .events = POLLIN}};
+        poll(fds, 2, r->out >= 0 || r->end >= 0 ? POLL_MS : POLL_MS / 10);
         drain(r);
         if (wait_for(r->child, status, WNOHANG, usage) == r->child)
             return late;
@@ -358,6 +362,7 @@ bool process_run(const struct process *p, struct process_usage *usage, struct er
         return false;
     struct run r = {.out = -1,
                     .log = -1,
+                    .end = -1,
                     .clean = p->log_most > 0,
                     .log_most = p->log_most > 0 ? p->log_most : (size_t)LOG_MAX};
     if (p->log != NULL &&
@@ -375,6 +380,7 @@ bool process_run(const struct process *p, struct process_usage *usage, struct er
     wait_for(r.guard, &(int){0}, 0, NULL);
     drain(&r);
     close_if_open(&r.out);
+    close_if_open(&r.end);
     if (r.log >= 0 && close(r.log) != 0 && r.log_errno == 0)
         r.log_errno = errno;
     double wall = progress_seconds() - t0;
