@@ -25,8 +25,9 @@ shift
 for word in "\${@:2}"; do
     if [ "\$word" = "\$out" ]; then continue; elif [ -f "\$word" ]; then files+=("\$word"); else words+=("\$word"); fi
 done
-key=\$(cat "\${files[@]}" - <<<"\${words[*]}" | md5sum)
-key=$tmp/rendered/\${key%% *}
+mapfile -t sums < <(exec md5sum "\${files[@]}" - <<<"\${words[*]}")
+key=$tmp/rendered/
+for sum in "\${sums[@]}"; do key+=\${sum:0:8}; done
 if [ ! -f "\$key" ]; then
     "\$@" || exit
     cp "\$out" "\$key.\$\$" && mv "\$key.\$\$" "\$key"
