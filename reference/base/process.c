@@ -148,8 +148,8 @@ static pid_t clone_blocked(int (*main)(void *), void *arg, char *stack_end, int 
 static pid_t start_child(struct child *c)
 {
     _Alignas(64) char stack[1 << 16];
-    const bool shares = c->p->before == NULL && IN_OUR_MEMORY;
-    return clone_blocked(child_main, c, stack + sizeof stack, shares ? CLONE_VM | CLONE_VFORK : 0);
+    return clone_blocked(child_main, c, stack + sizeof stack,
+                         c->p->before == NULL ? IN_OUR_MEMORY | CLONE_VFORK : 0);
 }
 
 static void close_if_open(int *fd)
