@@ -12,8 +12,6 @@ failures=0 what="own suite"
 (umask 077 && make -s install BUILD="$build" PREFIX="$tmp/my usr") >"$tmp/install.log" 2>&1
 tell "it installs" "$([ -x "$tmp/my usr/bin/assay" ] || tail -n 3 "$tmp/install.log")"
 tell "for all to read, whatever the umask" "$(find "$tmp/my usr"/* ! -type l ! -perm -004 | head -n 3)"
-# Memory that numpy has freed it uses again: some machines take ten microseconds for a new page.
-export MALLOC_MMAP_THRESHOLD_=1000000000 MALLOC_TRIM_THRESHOLD_=1000000000
 export PATH="$tmp/once:$tmp/my usr/bin:/usr/bin:$PATH"
 mkdir "$tmp/walk" "$tmp/free" "$tmp/once" "$tmp/rendered"
 # once OUT PROGRAM ARGUMENT...: renders OUT, or copies it if the same command was run before on the same contents of
