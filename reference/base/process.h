@@ -32,7 +32,8 @@ struct process_usage {
  * signal N / exit status N / no end after N s, then the last lines it printed, joined by " | "
  * (ASCII only). At the time limit the whole process group gets SIGTERM, 2 s later SIGKILL. Every
  * process of the group is killed by the time this returns, and also if the calling process dies for
- * any reason; if the kernel kills that for want of memory, only the program itself is. stdin is /dev/null. usage may be NULL; it is filled whenever the program was started. May
+ * any reason; if the kernel kills that for want of memory, only the program itself is. stdin is
+ * /dev/null. usage may be NULL; it is filled whenever the program was started. May
  * be called from several threads. Linux only (PR_SET_PDEATHSIG). */
 NODISCARD bool process_run(const struct process *p, struct process_usage *usage, struct err *e);
 
