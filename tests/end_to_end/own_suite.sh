@@ -25,7 +25,7 @@ for word in "\${@:2}"; do
 done
 mapfile -t sums < <(exec md5sum "\${files[@]}" - <<<"\${words[*]}")
 key=$tmp/rendered/
-for sum in "\${sums[@]}"; do key+=\${sum:0:8}; done
+for sum in "\${sums[@]}"; do key+=\${sum%% *}; done
 if [ ! -f "\$key" ]; then
     "\$@" || exit
     cp "\$out" "\$key.\$\$" && mv "\$key.\$\$" "\$key"
