@@ -166,6 +166,17 @@ static bool write_filter(struct sandbox *s, struct err *e)
     return ok || err_set(e, "%s: cannot write: %s", s->filter, strerror(errno));
 }
 
+/* Copies the loader's list of libraries: ldconfig(8), run by whoever installs something meanwhile, replaces the file,
+ * and bwrap cannot mount one that is replaced. */
+static bool copy_libraries(struct sandbox *s, struct err *e)
+{
+    static const char list[] = "/etc/ld.so.cache";
+    if (access(list, F_OK) != 0)
+        return true;
+    snprintf(s->libraries, sizeof s->libraries, "%s/libraries", s->dir.path);
+    return fs_copy(list, s->libraries, e);
+}
+
 static bool is_below(const char *path, const char *dir)
 {
     size_t n = strlen(dir);
@@ -226,7 +237,7 @@ bool sandbox_open(bool unsafe, const char *const *hidden, struct sandbox *out, s
     const struct path scene = fs_path("%s/probe-scene", out->dir.path);
     /* Without namespaces, programs may pass through this directory to their own files, but not list it. */
     chmod(out->dir.path, unsafe && out->drop ? 0711 : 0755);
-    if (!write_filter(out, e) || !fs_make_dirs(scene.s, e)) {
+    if (!write_filter(out, e) || !copy_libraries(out, e) || !fs_make_dirs(scene.s, e)) {
         sandbox_close(out);
         return false;
     }

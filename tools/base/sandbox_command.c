@@ -173,12 +173,12 @@ static void add_hidden(struct sandbox_line *l, const char *path, bool tools)
         add_all(l, (const char *const[]){"--ro-bind", "/dev/null", path, NULL});
 }
 
-/* What both layers have: programs and libraries, an empty environment, nothing else. */
-static void add_system(struct sandbox_line *l, const struct sandbox *s,
+/* What both layers have: programs and libraries, an empty environment, nothing else. libraries: the layer's path of the
+ * loader's list. */
+static void add_system(struct sandbox_line *l, const struct sandbox *s, const char *libraries,
                        const struct sandbox_limits *limit, bool tools)
 {
     static const char *const roots[] = {"bin", "sbin", "lib", "lib32", "lib64"};
-    static const char *const etc[] = {"/etc/ld.so.cache", "/etc/alternatives"};
     add_all(l,
             (const char *const[]){"bwrap", "--unshare-user", "--unshare-all", "--die-with-parent",
                                   "--new-session", "--clearenv", "--hostname", "box", NULL});
@@ -195,8 +195,10 @@ static void add_system(struct sandbox_line *l, const struct sandbox *s,
         add_text(l, S_ISLNK(st.st_mode) ? "usr/%s" : "/%s", roots[i]);
         add_text(l, "/%s", roots[i]);
     }
-    for (size_t i = 0; i < sizeof etc / sizeof *etc; i++)
-        add_all(l, (const char *const[]){"--ro-bind-try", etc[i], etc[i], NULL});
+    if (libraries[0] != '\0')
+        add_all(l, (const char *const[]){"--ro-bind", libraries, "/etc/ld.so.cache", NULL});
+    add_all(l,
+            (const char *const[]){"--ro-bind-try", "/etc/alternatives", "/etc/alternatives", NULL});
     add_all(l, (const char *const[]){"--proc", "/proc", "--dev", "/dev", "--size", NULL});
     add_text(l, "%zu", limit->disk);
     add_all(l, (const char *const[]){"--tmpfs", "/tmp", NULL});
@@ -220,7 +222,7 @@ static void add_inner(struct sandbox_line *l, const struct sandbox *s,
                       const struct sandbox_job *job)
 {
     const char *cache = job->cache != NULL ? "/cache" : NULL;
-    add_system(l, s, &job->limit, job->tools);
+    add_system(l, s, s->libraries[0] != '\0' ? "/etc/ld.so.cache" : "", &job->limit, job->tools);
     if (cache != NULL)
         add_all(
             l, (const char *const[]){job->fill_cache ? "--bind" : "--ro-bind", cache, cache, NULL});
@@ -259,7 +261,7 @@ void sandbox_line_boxed(struct sandbox_line *l, const struct sandbox *s,
     if (s->drop)
         add_all(l, (const char *const[]){"setpriv", "--reuid", "65534", "--regid", "65534",
                                          "--clear-groups", "--no-new-privs", NULL});
-    add_system(l, s, &job->limit, true);
+    add_system(l, s, s->libraries, &job->limit, true);
     add(l, "--size");
     add_text(l, "%zu", job->limit.disk);
     add_all(l, (const char *const[]){"--tmpfs", "/box", "--bind", job->out, "/out", NULL});

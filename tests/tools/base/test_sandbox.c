@@ -409,6 +409,17 @@ TEST(a_run_sees_what_is_listed_and_nothing_else)
     assert_true(atoi(kept("out.png")) > 30);
 }
 
+/* ldconfig(8) replaces /etc/ld.so.cache at any time, after which a mount of it cannot be mounted again. */
+TEST(the_list_of_libraries_is_a_copy)
+{
+    struct stat st;
+    if (stat("/etc/ld.so.cache", &st) != 0)
+        skip();
+    run("stat -c %i /etc/ld.so.cache >second; cat /etc/ld.so.cache >out.png");
+    assert_int_not_equal(strtoul(kept("second"), NULL, 10), st.st_ino);
+    must_do(fs_path("cmp /etc/ld.so.cache %s/out.png", out.s));
+}
+
 /* ccache's own account of hits and misses, and of what its directory holds before and after. */
 TEST(only_staff_fill_the_compiler_cache)
 {
