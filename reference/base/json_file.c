@@ -21,6 +21,10 @@ json_t *json_read(const char *path, size_t flags, json_error_t *why)
             fclose(f);
         return NULL;
     }
+    char mark[3];
+    const bool is_marked = fread(mark, 1, 3, f) == 3 && memcmp(mark, "\xef\xbb\xbf", 3) == 0;
+    if (!is_marked)
+        rewind(f);
     json_t *root = json_loadf(f, flags, why);
     fclose(f);
     return root;

@@ -67,6 +67,24 @@ TEST(a_suite_of_ones_own_is_read)
 }
 
 /* A reference is stale when any file of its scene has changed, and no other. */
+/* As some editors write it. */
+TEST(a_byte_order_mark_is_no_error)
+{
+    static const char *const marks[] = {"\xef\xbb\xbf", "\xef\xbb", "\xef\xbb\xbf\xef\xbb\xbf"};
+    char text[sizeof good + 8];
+    struct err e;
+    put_files(good);
+    for (int i = 0; i < 3; i++) {
+        OWN(suite) s;
+        snprintf(text, sizeof text, "%s%s", marks[i], good);
+        test_write_json(test_path("suite.json"), text);
+        if (i == 0)
+            MUST(suite_load(test_path("."), &s, &e));
+        else
+            REFUSES(suite_load(test_path("."), &s, &e), "suite.json:1: ");
+    }
+}
+
 TEST(files_that_a_scene_uses_are_in_its_hash)
 {
     OWN(suite) s, t;
