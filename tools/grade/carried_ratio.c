@@ -374,9 +374,10 @@ static bool carry_noise(const struct grading *g, const struct rubric_check *c, s
     submitted_image_unclipped(&own, use);
     bool related = difference_related(q, &own, use),
          known = related && difference_noise(p, &own, q, &own, use, g->alpha, &i, &why);
-    if (known && score_share(&c->log_ratio, &i) > out->share) {
-        out->share = score_share(&c->log_ratio, &i);
-        out->chance = score_chance(&c->log_ratio, &i);
+    const struct interval least = known ? score_at_least(i) : (struct interval){0};
+    if (known && score_share(&c->log_ratio, &least) > out->share) {
+        out->share = score_share(&c->log_ratio, &least);
+        out->chance = score_chance(&c->log_ratio, &least);
         out->more = 0;
         snprintf(out->carried, sizeof out->carried, "against the program's own image '%s'",
                  g->r->image[other].name);

@@ -31,6 +31,12 @@ double score_chance(const struct margin *m, const struct interval *i)
     return share == 0 ? beyond(v - half - m->none, i->sd) : 1;
 }
 
+struct interval score_at_least(struct interval i)
+{
+    const double lo = fmin(0, i.lo);
+    return (struct interval){fmin(0, i.value), lo, fmin(i.hi, -lo), i.sd};
+}
+
 double score_pixels(const struct margin *m, double wrong, double num)
 {
     double v = num > 0 ? wrong / num : 1;

@@ -588,13 +588,16 @@ TEST(parts_add_up_or_not)
         0);
 }
 
-/* The second image is asked for with 16 times the samples, and has them; or has as many as the first. */
+/* The second image is asked for with 16 times the samples, and has them; or as many as the first; or 256 times as many, as if they were
+ * stratified. */
 TEST(noise_falls_or_not)
 {
     const struct bug *const two[] = {&none, &none};
     const int asked[] = {SPP / 4, 4 * SPP};
     expect_share(check(CHECK_NOISE, 2, two, (const double[]){SPP / 4, 4 * SPP}, asked, 1e-5), 1, 1);
     expect_share(check(CHECK_NOISE, 2, two, (const double[]){SPP / 4, SPP / 4}, asked, 1e-5), 0, 0);
+    expect_share(check(CHECK_NOISE, 2, two, (const double[]){SPP / 4, 64 * SPP}, asked, 1e-5), 1,
+                 1);
 }
 
 /* The same of a program by another method than ours, which has a 400th of its variance in the left half: there our noise, but not
