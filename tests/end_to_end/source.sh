@@ -83,6 +83,7 @@ student not_c && echo 'int x = ;' >>"$tmp/class/not_c/tiny.c"
 student usage 'TINY = fprintf(stderr, "tiny: invalid option\nUsage: tiny [options]\n"); return 1;'
 student crash 'TINY = abort();'
 student no_return $'TINY = abort();\nCC = cc -Wreturn-type' && echo 'int value(void) { }' >>"$tmp/class/no_return/tiny.c"
+student crashes_once $'TINY = if (strstr(argv[argc - 1], "furnace")) abort();\nCC = cc -Wreturn-type' && cp "$tmp/class/no_return/tiny.c" "$tmp/class/crashes_once"
 student hang 'TINY = pause();'
 student hangs_once 'TINY = if (strstr(argv[argc - 1], "furnace")) pause();'
 student late 'TINY = atexit(abort);'
@@ -148,6 +149,8 @@ for name in moved network writes; do said make $name graded null && points make 
 said make hangs_once graded null
 said make late graded null && points make late 4.0
 tell "a program that fails when it has written its image is told so" "$(grep -q "after the program had written 'a' it failed (killed by signal 6" "$tmp/make/late/grade.json" || echo it is not)"
+said make crashes_once graded null
+tell "a crash beside images is told what the build warned of" "$(grep -q "killed by signal 6 (Aborted); its build warned: tiny.c:.* non-void function" "$tmp/make/crashes_once/grade.json" || grep '"seen"' "$tmp/make/crashes_once/grade.json")"
 points make hangs_once 0.0
 tell "the same scene is not run again" "$(grep -q "not run, as the program did not end on this scene before (image 'a')" "$tmp/make/hangs_once/grade.json" || echo it is)"
 tell "another scene is" "$(grep -q '"file": "c.pfm"' "$tmp/make/hangs_once/grade.json" || echo it is not)"

@@ -19,7 +19,7 @@ diagnose-rates: catalogue $(BUILD)/tests/diagnose_rates
 	$(BUILD)/tests/diagnose_rates $(BUILD) >$(BUILD)/diagnose_rates.md
 	cp $(BUILD)/diagnose_rates.md golden/diagnose/README.md
 #: make rubric-bugs what known bugs do to the images of the rubrics that ship, or of RUBRICS="[--variant N] FILES"
-rubric-bugs: RUBRICS ?= $(wildcard tools/rubrics/cs184-3-1*.rubric) --plain tools/rubrics/cs184-3-2.rubric
+rubric-bugs: RUBRICS ?= tools/rubrics/cs184-3-1.rubric tools/rubrics/cs184-3-1-before-2024.rubric --plain tools/rubrics/cs184-3-2.rubric
 rubric-bugs: all $(BUILD)/deps-test $(BUILD)/libassay.a $(BUILD)/tests/make_rubric_bugs
 	tests/mutants/mutants.sh --build-only $(BUILD)
 	tests/mutants/mutants.sh --build-only --patches tests/studies/grading/bugs $(BUILD)

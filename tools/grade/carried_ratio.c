@@ -144,8 +144,21 @@ static bool same_view(const struct rubric_image *a, const struct rubric_image *b
            a->width == b->width && a->height == b->height;
 }
 
+/* Is it, to the bit, the image of another depth? */
+static bool ignores_depth(const struct grading *g, int image)
+{
+    const struct rubric_image *p = &g->r->image[image];
+    for (int i = 0; i < g->r->num_images; i++) {
+        const struct rubric_image *q = &g->r->image[i];
+        if (same_view(p, q) && p->bounces != q->bounces && g->h->image[i].mean != NULL &&
+            strcmp(g->h->image[image].sha256, g->h->image[i].sha256) == 0)
+            return true;
+    }
+    return false;
+}
+
 /* Does the image agree, in each channel and tile, with the reference of the earlier image of the
- * same view, although it should have more bounces? Then it lacks them. */
+ * same view, although it should have more bounces? Then it lacks them. So it does if it is the image of another depth. */
 static bool is_what_was_asked_before(const struct grading *g, const struct rubric_check *c,
                                      bool *is, struct err *e)
 {
@@ -155,7 +168,7 @@ static bool is_what_was_asked_before(const struct grading *g, const struct rubri
     const size_t pixels = (size_t)p->width * (size_t)p->height;
     unsigned char *use = malloc(pixels);
     bool ok = use != NULL || err_set(e, "out of memory");
-    *is = false;
+    *is = ignores_depth(g, c->images[0]);
     for (size_t k = 0; ok && k < pixels; k++)
         use[k] = !rubric_masks(r, p->width, p->height, k);
     for (int set = 0;

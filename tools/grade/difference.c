@@ -491,6 +491,18 @@ static void take_shares(const struct pair *p, double *share)
             }
 }
 
+/* How many times as bright as the reference; 0 if black. */
+static double brightness(const struct pair *p)
+{
+    double of[2] = {0};
+    for (size_t i = 0; i < (size_t)p->a->width * (size_t)p->a->height; i++)
+        if (p->use[i]) {
+            of[0] += luminance(p->a->mean + 3 * i);
+            of[1] += luminance(p->b->mean + 3 * i);
+        }
+    return of[0] > 0 && of[1] > 0 ? of[0] / of[1] : 0;
+}
+
 bool difference_noise(const struct submitted_image *p, const struct submitted_image *reference_p,
                       const struct submitted_image *q, const struct submitted_image *reference_q,
                       const unsigned char *use, double alpha, struct interval *out, struct err *e)
@@ -509,10 +521,11 @@ bool difference_noise(const struct submitted_image *p, const struct submitted_im
     a.share = b.share = share;
     struct noise na = noise_in_image(&a), nb = noise_in_image(&b);
     free(share);
-    if (!na.known || !nb.known)
+    const double times = brightness(&a) / brightness(&b);
+    if (!na.known || !nb.known || !isnormal(times))
         return err_set(e, "there is no noise in one of the images");
     /* Var ln v = 2/dof. */
-    double sd = sqrt(2 / na.dof + 2 / nb.dof), value = log(na.kappa / nb.kappa);
+    double sd = sqrt(2 / na.dof + 2 / nb.dof), value = log(na.kappa / nb.kappa / (times * times));
     double half = stats_normal_quantile(alpha / 2) * sd;
     *out = (struct interval){value, value - half, value + half, sd};
     return true;

@@ -85,8 +85,9 @@ NODISCARD bool difference_correlated(const struct submitted_image *a,
 bool difference_related(const struct submitted_image *s, const struct submitted_image *right,
                         const unsigned char *use);
 
-/* ln(kappa of P over kappa of Q), each against its reference: whether the noise of a program falls from P to Q as
- * that of ours does. Fails where there is no noise in one of them. */
+/* ln(kappa of P over kappa of Q), each against its reference and over the square of how many times as bright it is:
+ * whether the noise of a program falls from P to Q as that of ours does. A factor of an estimator is one of its noise, too,
+ * and is no matter of this. Fails where there is no noise in one of them. */
 NODISCARD bool difference_noise(const struct submitted_image *p,
                                 const struct submitted_image *reference_p,
                                 const struct submitted_image *q,

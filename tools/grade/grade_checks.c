@@ -347,7 +347,7 @@ static bool check_noise(struct judging *w, struct result *out, struct err *e)
     struct err why;
     snprintf(
         out->expected, sizeof out->expected,
-        "the noise of %s over that of %s at least as with independent samples, within a factor of %.3g",
+        "the relative variance of %s over that of %s at least as with independent samples, within a factor of %.3g",
         judging_image(w, 0)->name, judging_image(w, 1)->name, exp(w->check->log_ratio.full));
     if (strcmp(p->sha256, q->sha256) == 0) {
         snprintf(out->seen, sizeof out->seen,
@@ -413,6 +413,7 @@ bool grade_checks_run(const struct grading *g, const struct rubric_check *check,
         snprintf(out->expected, sizeof out->expected, "image '%s'", g->r->image[i].name);
         snprintf(out->seen, sizeof out->seen, "%s", g->h->why[i]);
         out->judged = g->h->made[i].end != SANDBOX_LOST;
+        out->no_hint = true;
         return true;
     }
     bool ok = true;

@@ -7,18 +7,23 @@
 #include <math.h>
 #include <stdio.h>
 
-/* Widens the interval by what the stopping rule may do at the student's noise. ours: mean of our
- * counts. */
-static bool widen_count(struct judging *w, double ours, struct interval *count, struct result *out,
-                        struct err *e)
+/* Moves the interval towards 0 by what the stopping rule may do at the student's noise, and says so in note. ours: mean of
+ * our counts. */
+static bool allow_count(struct judging *w, double ours, struct interval *count, char note[120],
+                        struct result *out, struct err *e)
 {
     struct stopping rule;
     if (!judging_find_usable(w, out, e) || !judging_stopping(w, &rule, e))
         return false;
-    count->lo -= fmax(0, rule.most / ours - 1);
-    count->hi -= fmin(0, rule.least / ours - 1);
+    const double more = fmax(0, rule.most / ours - 1), fewer = fmin(0, rule.least / ours - 1),
+                 allowed = fmin(more, fmax(fewer, count->value));
     stopping_rule_free(&rule);
+    count->value -= allowed;
+    count->lo -= allowed;
+    count->hi -= allowed;
     out->more = 0;
+    snprintf(note, 120, "; at the noise of this image %+.2f to %+.2f %% are as right", 100 * fewer,
+             100 * more);
     return true;
 }
 
@@ -44,13 +49,15 @@ bool grade_checks_judge_rates(struct judging *w, struct result *out, struct err 
         return true;
     }
     double half = stats_normal_quantile(w->g->alpha / 2) * rates.sd;
-    struct interval count = {rates.more, rates.more - half, rates.more + half, rates.sd};
+    const struct interval seen = {rates.more, rates.more - half, rates.more + half, rates.sd};
+    struct interval count = seen;
+    char note[120] = "";
     /* A noisy program may rightly take many samples, but not all of them where there is no noise. */
     bool stops = rates.early > 0;
     if (!stops && !grade_checks_stops(w->g, &stops, e))
         return false;
     if (stops && score_share(&c->count, &count) < 1 && rubric_is_adaptive(judging_image(w, 0)) &&
-        !widen_count(w, rates.mean / (1 + rates.more), &count, out, e))
+        !allow_count(w, rates.mean / (1 + rates.more), &count, note, out, e))
         return false;
     out->share = score_pixels(&c->share, rates.odd, rates.pixels);
     out->chance = 0;
@@ -60,9 +67,9 @@ bool grade_checks_judge_rates(struct judging *w, struct result *out, struct err 
     }
     snprintf(
         out->seen, sizeof out->seen,
-        "%.0f of %.0f pixels stand for no multiple of %d; %.0f stopped early; %.4g samples a pixel on average, %+.2f %% from ours (%+.2f to %+.2f)",
-        rates.odd, rates.pixels, c->batch, rates.early, rates.mean, 100 * count.value,
-        100 * fmax(-1, count.lo), 100 * count.hi); /* no count is below 0 */
+        "%.0f of %.0f pixels stand for no multiple of %d; %.0f stopped early; %.4g samples a pixel on average, %+.2f %% from ours (%+.2f to %+.2f)%s",
+        rates.odd, rates.pixels, c->batch, rates.early, rates.mean, 100 * seen.value,
+        100 * fmax(-1, seen.lo), 100 * seen.hi, note); /* no count is below 0 */
     return true;
 }
 

@@ -93,11 +93,27 @@ static void missing_return(const char *log, char *out, size_t size)
         fclose(f);
 }
 
+/* Puts the warning behind the signal, before what the program printed. */
+static void tell_warning(const char *warned, char why[400])
+{
+    char rest[400] = "", *end = strstr(why, "): ");
+    if (end != NULL) {
+        snprintf(rest, sizeof rest, "%s", end + 1);
+        end[1] = '\0';
+    }
+    text_append(why, 400, "; its build warned: %s", warned);
+    text_append(why, 400, "%s", rest);
+}
+
 void submission_conclude(const struct rubric *r, const struct made *made, char (*why)[400],
                          const char *build_log, struct submission *s)
 {
     char warned[200];
     bool usage = true, same = true, any = s->kind == SUBMISSION_IMAGES;
+    missing_return(build_log, warned, sizeof warned);
+    for (int i = 0; warned[0] != '\0' && i < r->num_images; i++)
+        if (strstr(why[i], "killed by signal") != NULL)
+            tell_warning(warned, why[i]);
     for (int i = 0; i < r->num_images; i++) {
         if (why[i][0] == '\0' || s->state != SUBMISSION_GRADED)
             return;
@@ -113,9 +129,6 @@ void submission_conclude(const struct rubric *r, const struct made *made, char (
     const char *text = usage ? strchr(why[0], ':') + 2 : why[0];
     snprintf(s->why, sizeof s->why, "%s: %s%s%s%.400s", what, same ? "" : "'",
              same ? "" : r->image[0].name, same ? "" : "': ", text);
-    missing_return(build_log, warned, sizeof warned);
-    if (s->state == SUBMISSION_NOT_STARTED && warned[0] != '\0')
-        text_append(s->why, sizeof s->why, "; its build warned: %s", warned);
     for (int i = 0; same && i < r->num_images; i++)
         if (made[i].path[0] == '\0')
             snprintf(why[i], sizeof why[i], "%s", submission_not_made);
