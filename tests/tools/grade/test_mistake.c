@@ -229,6 +229,21 @@ TEST(what_is_missing_is_not_carried_on)
     assert_true(share_of(&v, "second_bounce") == 0);
 }
 
+/* Nor is it to an image that is the file of another depth, however near. Control: a_mistake_without_a_name_is_paid_once. */
+TEST(one_image_for_two_depths_is_not_carried_on)
+{
+    struct effect *kept[256];
+    const int bug = bug_images_number(&of, "light_area_doubled");
+    struct submitted_images *h = bug_images_hand_in(&of, 0, bug, -1, 1);
+    strcpy(h->image[image_number("corner_only_2")].sha256, h->image[image_number("corner")].sha256);
+    forget(bug, kept);
+    struct outcome v = grade(h);
+    remember(bug, kept);
+    bug_images_take_back(&of, h);
+    assert_true(share_of(&v, "five_bounces") == 0);
+    assert_true(share_of(&v, "third_bounce") == 1);
+}
+
 /* Nor is it where direct light, too dark by 20 %, happens to lie as far below that image as the bounces lie above
  * it. */
 TEST(an_image_without_bounces_is_not_carried_on)
