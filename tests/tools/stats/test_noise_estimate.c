@@ -72,7 +72,8 @@ static void assert_between(double got, double lo, double hi)
 
 /* 256 x 256 independent pixels: Var(sum D) = 2 sd^2 N. Its estimate has a relative sd of sqrt(2 x 3.78/N)
  * = 1.1 %, times an upper bound of the factor, which is 1 +- 4.3 % (4096 block means, sqrt(2 x 3.78/4096)),
- * times the allowance for 99.9 %: 1 to 1.35 in all. Degrees of freedom N/6, +- 10 % for the scatter of
+ * and more for larger blocks, of which there are fewer: what is asked is that it be at most 2, as with twice the variance
+ * the smallest difference that is found is 1.4 times as large. Degrees of freedom N/6, +- 10 % for the scatter of
  * r^4. Skewness 0 with sd 6.1/256 = 0.024, tested at 4 of these. */
 TEST(test_independent)
 {
@@ -85,7 +86,7 @@ TEST(test_independent)
     assert_true(noise_estimate_variance(&a, &b, NULL, NULL, NULL, false, &s, &e));
     struct cell c = image_cell(&a, &b);
     double n = 65536, v = c.va + c.vb;
-    assert_between(v / (2 * noise_sd * noise_sd * n), 0.97, 1.35);
+    assert_between(v / (2 * noise_sd * noise_sd * n), 0.97, 2);
     assert_between(2 * v * v / c.var_v / n, 0.9 / 6, 1.1 / 6);
     assert_between(s.factor[0], 0.85, 1.15);
     assert_between(s.skewness[0], -4 * 0.024, 4 * 0.024);
@@ -94,14 +95,14 @@ TEST(test_independent)
 }
 
 /* Noise shared by k x k pixels, k = 2 and 7: Var(sum) is k^2 times that of independent pixels of the same sd (each
- * normal number enters k^2 pixels with weight 1/k), less 3 % at the rim for k = 7. The estimate must not be below;
- * for 7 x 7, measured on means of 8 x 8 and extrapolated beyond, it is at most 2.5 times as large. */
+ * normal number enters k^2 pixels with weight 1/k), less 3 % at the rim for k = 7. The estimate must not be below, and
+ * again at most twice that; for 7 x 7, measured on means of 8 x 8 and extrapolated beyond, it is at most 2.5 times as large. */
 TEST(test_shared)
 {
     static const struct {
         enum noise kind;
         double factor, lo, hi;
-    } cases[] = {{SHARED, 2, 2.5, 5}, {SMOOTHED, 49, 0.95 * 49, 2.5 * 49}};
+    } cases[] = {{SHARED, 2, 0.95 * 4, 2 * 4}, {SMOOTHED, 49, 0.95 * 49, 2.5 * 49}};
     OWN(moments) a = new_moments(256, 256, "sample"), b = new_moments(256, 256, "sample");
     uint64_t seed = 6;
     struct noise_estimate s;
