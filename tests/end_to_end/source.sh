@@ -84,7 +84,7 @@ student usage 'TINY = fprintf(stderr, "tiny: invalid option\nUsage: tiny [option
 student crash 'TINY = abort();'
 student no_return $'TINY = abort();\nCC = cc -Wreturn-type' && echo 'int value(void) { }' >>"$tmp/class/no_return/tiny.c"
 student crashes_once $'TINY = if (strstr(argv[argc - 1], "furnace")) abort();\nCC = cc -Wreturn-type' && cp "$tmp/class/no_return/tiny.c" "$tmp/class/crashes_once"
-student hang 'TINY = pause();'
+student hang $'TINY = pause();\nCC = cc -Wreturn-type' && cp "$tmp/class/no_return/tiny.c" "$tmp/class/hang"
 student hangs_once 'TINY = if (strstr(argv[argc - 1], "furnace")) pause();'
 student late 'TINY = atexit(abort);'
 student lost 'AFTER = rm liblevel.so'
@@ -155,6 +155,7 @@ points make hangs_once 0.0
 tell "the same scene is not run again" "$(grep -q "not run, as the program did not end on this scene before (image 'a')" "$tmp/make/hangs_once/grade.json" || echo it is)"
 tell "another scene is" "$(grep -q '"file": "c.pfm"' "$tmp/make/hangs_once/grade.json" || echo it is not)"
 tell "hang: no image" "$(field make hang wrong | grep -q "No run of it made an image" || field make hang wrong)"
+tell "hang: what its build warned of" "$(field make hang wrong | grep -q "; its build warned: tiny.c:.* non-void function" || field make hang wrong)"
 tell "the class page says what is wrong" "$(grep -q 'the shared library liblevel.so is missing' "$tmp/make/index.html" || echo it does not)"
 tell "a build's log is kept" "$(grep -q 'expected expression' "$tmp/make/not_c/$(field make not_c build_log)" || echo it is not)"
 expect "archives" 0 "4.00 of 6" grade cmake "$tmp/cmake.rubric" "$tmp/zipped.zip" "$tmp/packed.tar.gz" "$tmp/inside" "$tmp/class/right"

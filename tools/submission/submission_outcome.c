@@ -129,6 +129,8 @@ void submission_conclude(const struct rubric *r, const struct made *made, char (
     const char *text = usage ? strchr(why[0], ':') + 2 : why[0];
     snprintf(s->why, sizeof s->why, "%s: %s%s%s%.400s", what, same ? "" : "'",
              same ? "" : r->image[0].name, same ? "" : "': ", text);
+    if (s->state == SUBMISSION_NOT_STARTED && warned[0] != '\0' && strstr(s->why, warned) == NULL)
+        text_append(s->why, sizeof s->why, "; its build warned: %s", warned);
     for (int i = 0; same && i < r->num_images; i++)
         if (made[i].path[0] == '\0')
             snprintf(why[i], sizeof why[i], "%s", submission_not_made);
