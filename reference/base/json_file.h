@@ -6,8 +6,8 @@
 
 #include <jansson.h>
 
-/* As json_load_file(), but a folder, FIFO or device cannot be read, and a byte order mark is no error. Returns a new reference, or NULL with the reason in
- * *why, without the path. */
+/* As json_load_file(), but a folder, FIFO or device cannot be read, and a byte order mark is no error. Returns a new
+ * reference, or NULL with the reason in *why, without the path. */
 json_t *json_read(const char *path, size_t flags, json_error_t *why);
 
 /* The same, but rejects duplicate members; the error is "FILE:LINE: why", or "FILE: why" if the file cannot be

@@ -38,7 +38,7 @@ struct sandbox {
     bool drop;           /* we are root: programs run as somebody else */
     struct temp_dir dir; /* for what runs read and write, readable by everybody */
     char filter[544];    /* path in it of the seccomp(2) filter; "": none */
-    char libraries[544]; /* path in it of what programs see as /etc/ld.so.cache; "": none */
+    char libraries[544]; /* path in it of what programs see as /etc/ld.so.cache, if that exists */
     char hidden[48]
                [512]; /* files and directories that must not be seen though they lie below /usr */
     int num_hidden;

@@ -195,10 +195,9 @@ static void add_system(struct sandbox_line *l, const struct sandbox *s, const ch
         add_text(l, S_ISLNK(st.st_mode) ? "usr/%s" : "/%s", roots[i]);
         add_text(l, "/%s", roots[i]);
     }
-    if (libraries[0] != '\0')
-        add_all(l, (const char *const[]){"--ro-bind", libraries, "/etc/ld.so.cache", NULL});
     add_all(l,
-            (const char *const[]){"--ro-bind-try", "/etc/alternatives", "/etc/alternatives", NULL});
+            (const char *const[]){"--ro-bind-try", libraries, "/etc/ld.so.cache", "--ro-bind-try",
+                                  "/etc/alternatives", "/etc/alternatives", NULL});
     add_all(l, (const char *const[]){"--proc", "/proc", "--dev", "/dev", "--size", NULL});
     add_text(l, "%zu", limit->disk);
     add_all(l, (const char *const[]){"--tmpfs", "/tmp", NULL});
@@ -222,7 +221,7 @@ static void add_inner(struct sandbox_line *l, const struct sandbox *s,
                       const struct sandbox_job *job)
 {
     const char *cache = job->cache != NULL ? "/cache" : NULL;
-    add_system(l, s, s->libraries[0] != '\0' ? "/etc/ld.so.cache" : "", &job->limit, job->tools);
+    add_system(l, s, "/etc/ld.so.cache", &job->limit, job->tools);
     if (cache != NULL)
         add_all(
             l, (const char *const[]){job->fill_cache ? "--bind" : "--ro-bind", cache, cache, NULL});

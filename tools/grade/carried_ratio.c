@@ -144,13 +144,15 @@ static bool same_view(const struct rubric_image *a, const struct rubric_image *b
            a->width == b->width && a->height == b->height;
 }
 
-/* Is it, to the bit, the image of another depth? */
-static bool ignores_depth(const struct grading *g, int image)
+/* Is it, to the bit, the earlier image, or one of another depth? */
+static bool is_another(const struct grading *g, const struct rubric_check *c)
 {
+    const int image = c->images[0];
     const struct rubric_image *p = &g->r->image[image];
     for (int i = 0; i < g->r->num_images; i++) {
         const struct rubric_image *q = &g->r->image[i];
-        if (same_view(p, q) && p->bounces != q->bounces && g->h->image[i].mean != NULL &&
+        if ((i == c->after || (same_view(p, q) && p->bounces != q->bounces)) &&
+            g->h->image[i].mean != NULL &&
             strcmp(g->h->image[image].sha256, g->h->image[i].sha256) == 0)
             return true;
     }
@@ -158,7 +160,7 @@ static bool ignores_depth(const struct grading *g, int image)
 }
 
 /* Does the image agree, in each channel and tile, with the reference of the earlier image of the
- * same view, although it should have more bounces? Then it lacks them. So it does if it is the image of another depth. */
+ * same view, although it should have more bounces? Then it lacks them. */
 static bool is_what_was_asked_before(const struct grading *g, const struct rubric_check *c,
                                      bool *is, struct err *e)
 {
@@ -168,7 +170,7 @@ static bool is_what_was_asked_before(const struct grading *g, const struct rubri
     const size_t pixels = (size_t)p->width * (size_t)p->height;
     unsigned char *use = malloc(pixels);
     bool ok = use != NULL || err_set(e, "out of memory");
-    *is = ignores_depth(g, c->images[0]);
+    *is = false;
     for (size_t k = 0; ok && k < pixels; k++)
         use[k] = !rubric_masks(r, p->width, p->height, k);
     for (int set = 0;
@@ -218,8 +220,7 @@ static bool carry_ratio(const struct grading *g, int set, const struct rubric_ch
     const struct submitted_image *p = &g->h->image[c->images[0]], *b = &g->h->image[c->after];
     const struct moments *rp = answer_key_image(g->a, set, c->images[0]),
                          *rb = answer_key_image(g->a, set, c->after);
-    if (b->mean == NULL || p->width != b->width || p->height != b->height ||
-        strcmp(p->sha256, b->sha256) == 0)
+    if (b->mean == NULL || p->width != b->width || p->height != b->height || is_another(g, c))
         return true;
     const size_t pixels = (size_t)p->width * (size_t)p->height;
     const double clip = rubric_sight_clip(r);
@@ -369,7 +370,7 @@ static bool carry_noise(const struct grading *g, const struct rubric_check *c, s
     struct submitted_image *p = &g->h->image[c->images[0]], *q = &g->h->image[c->images[1]], own;
     int other = quieter(g->r, g->h, c->images[0]);
     size_t pixels = (size_t)p->width * (size_t)p->height;
-    struct interval i;
+    struct interval i = {0};
     struct err why;
     if (other < 0 || strcmp(p->sha256, q->sha256) == 0)
         return true;
@@ -387,7 +388,7 @@ static bool carry_noise(const struct grading *g, const struct rubric_check *c, s
     submitted_image_unclipped(&own, use);
     bool related = difference_related(q, &own, use),
          known = related && difference_noise(p, &own, q, &own, use, g->alpha, &i, &why);
-    const struct interval least = known ? score_at_least(i) : (struct interval){0};
+    const struct interval least = score_at_least(i);
     if (known && score_share(&c->log_ratio, &least) > out->share) {
         out->share = score_share(&c->log_ratio, &least);
         out->chance = score_chance(&c->log_ratio, &least);

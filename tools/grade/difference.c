@@ -491,16 +491,12 @@ static void take_shares(const struct pair *p, double *share)
             }
 }
 
-/* How many times as bright as the reference; 0 if black. */
+/* How many times as bright as the reference; 0 if either is black. */
 static double brightness(const struct pair *p)
 {
-    double of[2] = {0};
-    for (size_t i = 0; i < (size_t)p->a->width * (size_t)p->a->height; i++)
-        if (p->use[i]) {
-            of[0] += luminance(p->a->mean + 3 * i);
-            of[1] += luminance(p->b->mean + 3 * i);
-        }
-    return of[0] > 0 && of[1] > 0 ? of[0] / of[1] : 0;
+    const struct rect whole = {0, 0, p->a->width, p->a->height};
+    const struct sums s = sum_pixels(p, whole, CHANNEL_LUMINANCE, 1);
+    return s.b > 0 ? fmax(0, 1 + s.d / s.b) : 0;
 }
 
 bool difference_noise(const struct submitted_image *p, const struct submitted_image *reference_p,

@@ -24,7 +24,8 @@ double score_width(const struct margin *m, const struct interval *i);
  * most alpha. */
 double score_chance(const struct margin *m, const struct interval *i);
 
-/* The same where what is above 0 costs nothing: the interval ends as far above 0 as below it at most, for its width. */
+/* The interval of a quantity that costs nothing above 0: it ends as far above 0 as below it at most, or its width would
+ * cost. */
 struct interval score_at_least(struct interval i);
 
 /* The share of the points where `wrong` of `num` pixels are wrong, an exact count. num 0: all are

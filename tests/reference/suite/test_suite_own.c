@@ -66,7 +66,6 @@ TEST(a_suite_of_ones_own_is_read)
     assert_int_equal(dark->num_references, 2);
 }
 
-/* A reference is stale when any file of its scene has changed, and no other. */
 /* As some editors write it. */
 TEST(a_byte_order_mark_is_no_error)
 {
@@ -85,6 +84,7 @@ TEST(a_byte_order_mark_is_no_error)
     }
 }
 
+/* A reference is stale when any file of its scene has changed, and no other. */
 TEST(files_that_a_scene_uses_are_in_its_hash)
 {
     OWN(suite) s, t;
