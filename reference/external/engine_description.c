@@ -4,6 +4,7 @@
 #include "reference/base/json_file.h"
 #include "reference/suite/features.h"
 #include "reference/base/json_node.h"
+#include "renderer/base/fs.h"
 
 #include <errno.h>
 #include <libgen.h>
@@ -285,6 +286,12 @@ bool engine_load(const char *path, struct engine *out, struct err *e)
     }
     *out = en;
     return true;
+}
+
+bool engine_load_named(const char *name, const char *share_dir, struct engine *out, struct err *e)
+{
+    const bool is_file = strpbrk(name, "./") != NULL;
+    return engine_load(is_file ? name : fs_path("%s/engines/%s.json", share_dir, name).s, out, e);
 }
 
 void engine_free(struct engine *en)

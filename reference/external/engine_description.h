@@ -41,11 +41,17 @@ struct engine_options {
     int threads;
     double timeout_s;     /* of one process; it is killed (whole process group) after that */
     const char *work_dir; /* exists; gets a sub-directory, removed on success */
+    /* NULL, or called with each image (RGB, 3 floats a pixel) of "mean" in their order. */
+    void (*on_replicate)(void *ctx, int k, const float *pixels_rgb);
+    void *on_replicate_ctx;
 };
 
 /* Fails, naming file and key, on what engine.md does not allow: unknown keys and placeholders, values
  * of the wrong type, a command without {scene} or {out}, "mean" without {seed}. */
 NODISCARD bool engine_load(const char *path, struct engine *out, struct err *e);
+/* The same for what a command line names: a file, or, without a dot or slash, SHARE/engines/NAME.json. */
+NODISCARD bool engine_load_named(const char *name, const char *share_dir, struct engine *out,
+                                 struct err *e);
 void engine_free(struct engine *en);
 
 /* The value of a placeholder. */

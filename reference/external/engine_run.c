@@ -156,6 +156,8 @@ static bool fold_runs(struct engine_job *j, struct moments *m, struct err *e)
                     : "");
         moments_add_image(m, px);
         replicates_add(&seen, px);
+        if (j->opt->on_replicate != NULL)
+            j->opt->on_replicate(j->opt->on_replicate_ctx, k, px);
         free(px);
     }
     if (ok && j->en->output == OUTPUT_NOISY)

@@ -5,6 +5,7 @@
 #include "renderer/base/sha256.h"
 #include "renderer/base/fs.h"
 #include "reference/base/json_file.h"
+#include "reference/base/json_node.h"
 
 #include <dirent.h>
 #include <errno.h>
@@ -263,6 +264,21 @@ void golden_inspect(const char *golden_dir, const struct suite_scene *scene,
             *e = stale;
     }
     json_decref(all);
+}
+
+bool golden_has_filter(const json_t *manifest, const struct suite_scene *scene, const char *engine,
+                       struct err *e)
+{
+    const json_t *settings = json_object_get(manifest, "settings");
+    const char *stored = member_text(json_object_get(settings, "description"), "filter");
+    struct pixel_filter filter;
+    char has[PIXEL_FILTER_TEXT], wanted[PIXEL_FILTER_TEXT];
+    if (!pixel_filter_parse(stored != NULL ? stored : "box", &filter, e))
+        return err_prefix(e, "%s, %s: the manifest", scene->name, engine);
+    pixel_filter_print(&filter, has);
+    pixel_filter_print(&scene->filter, wanted);
+    return strcmp(has, wanted) == 0 || err_set(e, "%s, %s: stored with the pixel filter %s, not %s",
+                                               scene->name, engine, has, wanted);
 }
 
 bool golden_is_there(const char *golden_dir, const struct suite_scene *scene,

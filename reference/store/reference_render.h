@@ -68,6 +68,10 @@ NODISCARD bool golden_remove(const char *golden_dir, const char *scene, const ch
 NODISCARD bool golden_read(const char *golden_dir, const struct suite_scene *scene,
                            const struct suite_reference *ref, struct moments *out,
                            json_t **manifest, struct err *e);
+/* Fails unless that reference was stored with the scene's pixel filter: the one that the engine's description in its
+ * manifest names, else the box of one pixel. */
+NODISCARD bool golden_has_filter(const json_t *manifest, const struct suite_scene *scene,
+                                 const char *engine, struct err *e);
 
 enum golden_state {
     GOLDEN_CURRENT, /* golden_read() accepts it */

@@ -613,6 +613,44 @@ bad_description "unknown key" "unknown key 'colour'"
 engine "$command" '"diffuse"'
 expect "a renderer that can express nothing" 3 "fake can express none .*does not list: point" \
     $student --engine "$tmp/fake.json"
+# Convergence of any renderer. Controls: a bias, and samples that are not taken.
+converge="env PATH=$engine_path $assay converge -q --shrink 4 -k 8 --ladder 1,4,16 --alpha 0.01 --slope-margin 0.25 --margin 0.05"
+# said PATTERN...: the last command printed a line with each.
+said() { for pattern; do grep -q "$pattern" "$tmp/out" || echo "no line with $pattern"; done; }
+expect "converge: another renderer beside ours" 0 "^student *variance / pathtracer's at 16 spp" \
+    $converge --engine student --engine pathtracer -o "$tmp/conv9" 13_square_patch
+tell "converge: which is judged" "$(said "^student *slope of RMSE .*EQUIVALENT" "^student *RMS bias .*EQUIVALENT")"
+engine "$command" '"diffuse", "area"'
+fake 'exec student_tracer "$@" 1.2'
+expect "converge: another renderer with a bias" 1 "^fake: .*RMS bias is above 5 %" \
+    $converge --engine "$tmp/fake.json" -o "$tmp/conv9" 13_square_patch
+expect "converge: its page says why" 0 "<b>fake</b>: .*RMS bias is above 5 %" cat "$tmp/conv9/index.html"
+fake 'exec student_tracer "$1" 4 "$3" "$4"'
+expect "converge: another renderer whose samples have no effect" 1 "^fake: the slope is not at most -1/2" \
+    $converge --engine "$tmp/fake.json" -o "$tmp/conv9" 13_square_patch
+expect "converge: what a renderer cannot express" 3 "student: could not be judged: it cannot express this scene: .*mirror" \
+    $converge --engine student -o "$tmp/conv9" 21_mirror
+# described NAME OUTPUT_AND_KEYS [WORDS]: our renderer, described in NAME.json.
+described() {
+    echo "{\"name\": \"$1\", \"format\": \"dae\", \"expresses\": [\"diffuse\", \"area\"], \"output\": $2,
+        \"command\": [\"$pathtracer\", \"-q\", \"{scene}\", \"-s\", \"{spp}\", \"-r\", \"{width}\", \"{height}\", ${3:-} \"-f\", \"{out}\"]}" >"$tmp/$1.json"
+}
+described stated '"moments"' '"--seed", "{seed}",'
+expect "converge: a renderer that writes moments" 0 "^stated *slope of RMSE .*EQUIVALENT" \
+    $converge --engine "$tmp/stated.json" -o "$tmp/conv9" 13_square_patch
+described tent '"mean", "filter": "tent:1"' '"--seed", "{seed}", "--filter", "tent:1",'
+tent="${converge/--shrink 4/} --engine $tmp/tent.json"
+expect "converge: a renderer with another pixel filter" 0 "^tent *RMS bias .*EQUIVALENT" $tent -o "$tmp/conv9" 13_square_patch
+expect "converge: which stored references have not" 3 "cycles: stored with the pixel filter box:0.5, not tent:1" \
+    $tent --reference cycles -o "$tmp/conv9" 13_square_patch
+expect "converge: and which cannot be made smaller" 3 "tent: --shrink is for pixel filters of one box" $converge --engine "$tmp/tent.json" 13_square_patch
+expect "converge: two filters have no common reference" 3 "its pixel filter is box:0.5, that of tent tent:1" \
+    $tent --engine student 13_square_patch
+described same '"noisy"'
+expect "converge: a renderer without seeds" 3 "same.json: convergence is measured on images with seeds" $converge --engine "$tmp/same.json" 13_square_patch
+expect "converge: an engine twice" 3 "pathtracer is given twice" $converge --engine pathtracer --engine pathtracer 13_square_patch
+expect "converge: an engine that is not there" 3 "engines/blendr.json: cannot read" $converge --engine blendr 13_square_patch
+expect "converge: a reference that is not there" 3 "13_square_patch has no reference 'pbrt'" $converge --engine student --reference pbrt 13_square_patch
 sed 's/"point", //' reference/engines/student.json >"$tmp/no_points.json"
 expect "what a renderer cannot express is listed" 0 "student cannot express 12_point_plane" \
     env PATH="$engine_path" $validate --only 11_furnace/student:truth --only 12_point_plane \

@@ -144,6 +144,8 @@ start=$tmp/in/history
 no_memory "report --history" "$assay" report --history .
 
 no_memory "converge" "$assay" converge -q -t 1 "${places[@]}" --pathtracer "$plain" --engine pathtracer -k 4 --ladder 1,4,16 --depth-spp 2 -o out 13_square_patch
+most=5
+no_memory "converge: an engine" "$assay" converge -q -t 1 "${places[@]}" --engine "$tmp/in/other.json" -k 4 --ladder 1,4,16 -o out 13_square_patch
 render -r 32 32 -m 1 -f view.exr "$point"
 no_memory "diagnose" "$assay" diagnose --suite "$scenes" --catalogue "$root/golden/diagnose" --json x.json --scene 12_point_plane "$tmp/in/view.exr"
 mkdir -p subs/1 subs/2 && cp 1.png subs/1/point.png && cp 2.png subs/2/point.png

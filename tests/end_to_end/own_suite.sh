@@ -50,6 +50,8 @@ expect "goldens are current" 0 "current  cornell/mine-1.0" env -C begun assay go
 again=$(python3 -c "import json; print(json.load(open('report/results.json'))['claims'][0]['rerun'])")
 expect "the command of a claim runs as it is printed" 0 "result: all as it should be" bash -c "$again"
 # Printed commands are for whoever reads the page, in whatever folder.
+expect "convergence of the suite's engine" 0 "^mine *slope of RMSE .*EQUIVALENT" \
+    assay converge -q --suite begun -k 8 --ladder 1,4,16 --slope-margin 0.25 --margin 0.1 -o converged cornell
 mkdir elsewhere
 expect "in another folder, too" 0 "result: all as it should be, 1 the same" env -C elsewhere bash -c "$again"
 expect "validate in the folder itself" 0 "result: all as it should be, 1 the same" env -C begun assay validate -q --out "$tmp/free/report"

@@ -3,6 +3,7 @@
 #ifndef ASSAY_CONVERGE_ENGINE_H
 #define ASSAY_CONVERGE_ENGINE_H
 
+#include "reference/external/engine_description.h"
 #include "reference/store/reference_render.h"
 #include "renderer/base/progress.h"
 
@@ -13,24 +14,27 @@ enum converge_engine {
     CONVERGE_PATHTRACER,
     CONVERGE_SOBOL,
     CONVERGE_REFERENCES, /* the first of engine_table.h, and so on */
-    CONVERGE_NUM_ENGINES = CONVERGE_REFERENCES + NUM_ENGINES_WITH_GOLDENS
+    CONVERGE_NUM_ENGINES = CONVERGE_REFERENCES + NUM_ENGINES_WITH_GOLDENS,
+    CONVERGE_OWN = CONVERGE_NUM_ENGINES, /* converge_render_own() */
+    CONVERGE_DESCRIBED                   /* the first of the job's descriptions, and so on */
 };
-extern const char *const converge_engine_names[]; /* end with NULL */
+extern const char *const converge_engine_names[]; /* of those before CONVERGE_OWN; end with NULL */
 
-enum { CONVERGE_MAX_REPLICATES = 4096, CONVERGE_MAX_RUNGS = 16 };
+enum { CONVERGE_MAX_REPLICATES = 4096, CONVERGE_MAX_RUNGS = 16, CONVERGE_MAX_DESCRIBED = 8 };
 
 struct converge_job {
     const struct suite_scene *scene; /* width and height are those of the images to render */
     const char *pathtracer;          /* the program */
     const char *dir;                 /* for temporary files; exists */
     const char *share_dir;           /* where cycles.py is */
+    const struct engine *described;  /* any renderers; they have replicates ("mean" or "moments") */
     uint32_t seed;
     int threads;
     double timeout_s; /* of one process */
     int replicates;
 };
 
-/* Progress, updated after every image of ours; the other engines deliver all images at once. */
+/* Progress, updated after every image; Cycles and POV-Ray deliver all images at once. */
 struct converge_progress {
     struct progress *progress;
     double before, each, total; /* work: before this rung, of one image, of the whole ladder */

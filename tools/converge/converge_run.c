@@ -6,6 +6,7 @@
 #include "renderer/base/version.h"
 #include "tools/results/claim_result.h"
 #include "tools/stats/convergence_rate.h"
+#include "tools/stats/distributions.h"
 #include "depth_ladder.h"
 
 #include <errno.h>
@@ -14,9 +15,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-
-const char *const converge_against_names[] = {"auto", "truth",
-                                              ENGINES_WITH_GOLDENS(ENGINE_WORD) "own", NULL};
 
 /* Our own reference has this many times the samples of the top rung. */
 enum { OWN_FACTOR = 64 };
@@ -37,23 +35,45 @@ struct run {
     double alpha;   /* of one judgement */
 };
 
-static bool is_independent(int engine)
+static const char *name_of(const struct run *r, enum converge_engine engine)
+{
+    return engine < CONVERGE_OWN ? converge_engine_names[engine]
+                                 : r->opt->described[engine - CONVERGE_DESCRIBED].name;
+}
+
+static bool is_independent(enum converge_engine engine)
 {
     return engine == CONVERGE_PATHTRACER;
 }
 
-/* Ours must leave no bias whatever the sampler; other engines are measured. */
-static bool is_judged(int engine)
+/* Ours and described ones must leave no bias whatever the sampler; Cycles and POV-Ray are measured. */
+static bool is_judged(enum converge_engine engine)
 {
-    return engine < CONVERGE_REFERENCES;
+    return engine < CONVERGE_REFERENCES || engine >= CONVERGE_DESCRIBED;
 }
 
-static enum converge_against choose_reference(const struct suite_scene *s)
+/* Of independent samples the slope is -1/2; of described engines, whose samples may be stratified, at most that. */
+static bool is_slope_judged(enum converge_engine engine)
 {
-    for (enum converge_against a = AGAINST_TRUTH; a < AGAINST_OWN; a++)
-        if (suite_reference_of(s, converge_against_names[a]) != NULL)
-            return a;
-    return AGAINST_OWN;
+    return is_independent(engine) || engine >= CONVERGE_DESCRIBED;
+}
+
+/* The first that there is with the pixel filter of scene s; NULL: a long run of ours. */
+static const struct suite_reference *choose_reference(const struct suite_scene *s,
+                                                      const struct suite_scene *from)
+{
+    struct err why;
+    const struct suite_reference *ref = suite_reference_of(from, "truth");
+    if (ref != NULL && truth_knows(s, ref, &why))
+        return ref;
+    for (int k = 0; engine_names[k] != NULL && s->filter.radius <= 0; k++)
+        if ((ref = suite_reference_of(from, engine_names[k])) != NULL)
+            return ref;
+    for (int k = 0; k < from->num_references; k++)
+        if (reference_is_rendered(&from->reference[k]) &&
+            engine_with_goldens(from->reference[k].engine) == NULL)
+            return &from->reference[k];
+    return NULL;
 }
 
 /* Loads or renders the reference of scene s, which uses the references of `from`, and names it. */
@@ -62,26 +82,30 @@ static bool load_reference(const struct run *r, const struct suite_scene *s,
                            struct converge_reference *out, char name[64], struct err *e)
 {
     const struct converge_options *o = r->opt;
-    enum converge_against against =
-        o->against == AGAINST_AUTO ? choose_reference(from) : o->against;
-    const char *engine = converge_against_names[against];
+    const bool choose = strcmp(o->against, "auto") == 0, own = strcmp(o->against, "own") == 0;
+    const struct suite_reference *ref = choose ? choose_reference(s, from)
+                                        : own  ? NULL
+                                               : suite_reference_of(from, o->against);
     struct moments m;
     int shrink = o->shrink;
-    if (against == AGAINST_OWN) {
+    if (ref == NULL && !choose && !own)
+        return err_set(e, "%s has no reference '%s'", from->name, o->against);
+    if (ref == NULL || (!reference_is_rendered(ref) && strcmp(ref->engine, "truth") != 0)) {
         shrink = 1;
         int spp = OWN_FACTOR * o->ladder[o->num_rungs - 1];
         snprintf(name, 64, "pathtracer, %d samples", spp);
         if (!converge_render_own(job, spp, &m, e))
             return false;
     } else {
-        const struct suite_reference *ref = suite_reference_of(from, engine);
-        if (ref == NULL)
-            return err_set(e, "%s has no reference '%s'", from->name, engine);
-        snprintf(name, 64, against == AGAINST_TRUTH ? "closed form" : "golden of %s", engine);
+        const bool truth = strcmp(ref->engine, "truth") == 0;
+        snprintf(name, 64, truth ? "closed form" : "golden of %s", ref->engine);
         json_t *manifest = NULL;
-        bool ok = against == AGAINST_TRUTH
-                      ? truth_render(s, ref, &m, e)
-                      : golden_read(o->golden_dir, from, ref, &m, &manifest, e);
+        bool ok = truth ? truth_render(s, ref, &m, e)
+                        : golden_read(o->golden_dir, from, ref, &m, &manifest, e);
+        if (ok && !truth && !golden_has_filter(manifest, s, ref->engine, e)) {
+            moments_free(&m);
+            ok = false;
+        }
         json_decref(manifest);
         if (!ok)
             return false;
@@ -91,18 +115,24 @@ static bool load_reference(const struct run *r, const struct suite_scene *s,
     return ok || err_prefix(e, "%s", s->name);
 }
 
-static void climb(const struct run *r, const struct converge_job *job, int engine,
+static void climb(const struct run *r, const struct converge_job *job, enum converge_engine engine,
                   const struct converge_reference *ref, struct ladder *out)
 {
     const struct converge_options *o = r->opt;
     char what[128];
+    if (engine >= CONVERGE_DESCRIBED &&
+        !engine_expresses(&o->described[engine - CONVERGE_DESCRIBED], job->scene, job->dir,
+                          &out->e)) {
+        err_prefix(&out->e, "it cannot express this scene");
+        return;
+    }
     float *images = malloc((size_t)o->replicates * ref->size * sizeof *images);
     if (images == NULL) {
         err_set(&out->e, "out of memory for %d replicates", o->replicates);
         return;
     }
     struct progress progress;
-    snprintf(what, sizeof what, "%s, %s", job->scene->name, converge_engine_names[engine]);
+    snprintf(what, sizeof what, "%s, %s", job->scene->name, name_of(r, engine));
     progress_start(&progress, what, NULL, o->quiet);
     /* An image costs its samples and a start; this guess of the start is good enough for a progress bar. */
     const double start = o->ladder[o->num_rungs - 1] / 4.0;
@@ -114,7 +144,7 @@ static void climb(const struct run *r, const struct converge_job *job, int engin
         double cpu_s = 0;
         free(out->version);
         ok = converge_render(
-            job, (enum converge_engine)engine, i, o->ladder[i], images, &cpu_s, &out->version,
+            job, engine, i, o->ladder[i], images, &cpu_s, &out->version,
             &(struct converge_progress){&progress, done, o->ladder[i] + start, total}, &out->e);
         if (ok && !convergence_rate_rung(images, o->replicates, o->ladder[i], ref, &out->rung[i],
                                          &out->e))
@@ -150,35 +180,44 @@ static json_t *rung_json(const struct rung *g, const struct cost *c, double alph
 }
 
 /* The judgements of one engine: each, the worst of them as the verdict, and a reason. */
-static json_t *verdict_json(const struct run *r, int engine, const struct ladder *l)
+static json_t *verdict_json(const struct run *r, enum converge_engine engine,
+                            const struct ladder *l, const struct converge_reference *ref)
 {
     const struct converge_options *o = r->opt;
     const struct rung *top = &l->rung[o->num_rungs - 1];
     struct estimate slope = convergence_rate_slope(l->rung, o->num_rungs);
     struct interval si = estimate_interval(slope, r->alpha),
                     fi = convergence_rate_floor(top, r->alpha);
-    enum verdict vs = convergence_rate_slope_verdict(slope, r->alpha, o->slope_margin);
+    const bool judge_slope = is_slope_judged(engine), judged = is_judged(engine);
+    enum verdict vs = is_independent(engine)
+                          ? convergence_rate_slope_verdict(slope, r->alpha, o->slope_margin)
+                          : convergence_rate_slope_at_most(slope, r->alpha, o->slope_margin);
     enum verdict vf = convergence_rate_floor_verdict(top, o->margin, r->alpha);
-    bool judge_slope = is_independent(engine), judged = is_judged(engine);
     bool different = vf == VERDICT_DIFFERENT || (judge_slope && vs == VERDICT_DIFFERENT);
     bool unclear = vf == VERDICT_INCONCLUSIVE || (judge_slope && vs == VERDICT_INCONCLUSIVE);
     enum verdict v = different ? VERDICT_DIFFERENT
                      : unclear ? VERDICT_INCONCLUSIVE
                                : VERDICT_EQUIVALENT;
+    /* What the reference alone contributes to the interval of the squared bias. */
+    const double of_reference = stats_normal_quantile(r->alpha) * sqrt(ref->noise_var);
     char reason[512], of_slope[160] = "";
     if (judge_slope)
         snprintf(of_slope, sizeof of_slope,
-                 vs == VERDICT_DIFFERENT      ? "the slope is not -1/2; "
-                 : vs == VERDICT_INCONCLUSIVE ? "the slope is known to no better than +-%.3g; "
-                                              : "the slope is -1/2 within +-%.3g; ",
-                 (si.hi - si.lo) / 2);
-    snprintf(reason, sizeof reason,
-             "%sat %g samples the RMS bias is %s %.3g %%, from %.3g %% to %.3g %%", of_slope,
-             top->spp,
-             vf == VERDICT_DIFFERENT      ? "above"
-             : vf == VERDICT_INCONCLUSIVE ? "not shown to be below"
-                                          : "below",
-             100 * o->margin, 100 * fi.lo, 100 * fi.hi);
+                 vs == VERDICT_DIFFERENT ? "the slope is not %s-1/2; "
+                 : vs == VERDICT_INCONCLUSIVE
+                     ? "the slope is not shown to be %s-1/2 within +-%.3g; "
+                     : "the slope is %s-1/2 within +-%.3g; ",
+                 is_independent(engine) ? "" : "at most ", o->slope_margin);
+    snprintf(
+        reason, sizeof reason,
+        "%sat %g samples the RMS bias is %s %.3g %%, from %.3g %% to %.3g %%%s", of_slope, top->spp,
+        vf == VERDICT_DIFFERENT      ? "above"
+        : vf == VERDICT_INCONCLUSIVE ? "not shown to be below"
+                                     : "below",
+        100 * o->margin, 100 * fi.lo, 100 * fi.hi,
+        vf == VERDICT_INCONCLUSIVE && of_reference > o->margin * o->margin
+            ? ": the reference is too noisy for this margin (--margin), whatever the replicates"
+            : "");
     return json_pack(
         "{s:f, s:o, s:s, s:o, s:s, s:s, s:b, s:s}", "slope", slope.value, "slope_ci",
         json_interval(si.lo, si.hi), "slope_verdict", judge_slope ? verdict_name(vs) : "MEASURED",
@@ -187,9 +226,10 @@ static json_t *verdict_json(const struct run *r, int engine, const struct ladder
         "passed", !judged || v == VERDICT_EQUIVALENT, "reason", reason);
 }
 
-static json_t *engine_json(const struct run *r, int engine, const struct ladder *l)
+static json_t *engine_json(const struct run *r, enum converge_engine engine, const struct ladder *l,
+                           const struct converge_reference *ref)
 {
-    json_t *j = json_pack("{s:s, s:b, s:b}", "engine", converge_engine_names[engine], "independent",
+    json_t *j = json_pack("{s:s, s:b, s:b}", "engine", name_of(r, engine), "independent",
                           is_independent(engine), "judged", is_judged(engine));
     if (!l->present) {
         json_object_set_new(j, "passed", json_false());
@@ -199,16 +239,16 @@ static json_t *engine_json(const struct run *r, int engine, const struct ladder 
     json_t *rungs = json_array();
     for (int i = 0; i < r->opt->num_rungs; i++)
         json_array_append_new(rungs, rung_json(&l->rung[i], &l->cost, r->alpha));
-    json_object_update_new(j, verdict_json(r, engine, l));
+    json_object_update_new(j, verdict_json(r, engine, l, ref));
     json_object_update_new(j, json_pack("{ss*,so,so,so}", "version",
-                                        is_judged(engine) ? assay_version : l->version, "start_s",
-                                        json_finite(l->cost.start_s), "cpu_s_per_spp",
+                                        engine < CONVERGE_REFERENCES ? assay_version : l->version,
+                                        "start_s", json_finite(l->cost.start_s), "cpu_s_per_spp",
                                         json_finite(l->cost.per_spp.value), "rungs", rungs));
     return j;
 }
 
-static json_t *ratio_json(const struct run *r, int a, const struct ladder *la, int b,
-                          const struct ladder *lb)
+static json_t *ratio_json(const struct run *r, enum converge_engine a, const struct ladder *la,
+                          enum converge_engine b, const struct ladder *lb)
 {
     json_t *rungs = json_array();
     for (int i = 0; i < r->opt->num_rungs; i++) {
@@ -223,8 +263,7 @@ static json_t *ratio_json(const struct run *r, int a, const struct ladder *la, i
                                                json_finite(exp(eff.value)), "efficiency_ci",
                                                exp_pair(eff, r->alpha, 1)));
     }
-    return json_pack("{s:s, s:s, s:o}", "a", converge_engine_names[a], "b",
-                     converge_engine_names[b], "rungs", rungs);
+    return json_pack("{s:s, s:s, s:o}", "a", name_of(r, a), "b", name_of(r, b), "rungs", rungs);
 }
 
 static bool run_scene(const struct run *r, const struct suite_scene *scene, json_t *convergence,
@@ -235,49 +274,58 @@ static bool run_scene(const struct run *r, const struct suite_scene *scene, json
     if (scene->width % o->shrink != 0 || scene->height % o->shrink != 0)
         return err_set(e, "%s: %d x %d pixels cannot be made %d times smaller", scene->name,
                        scene->width, scene->height, o->shrink);
-    struct suite_scene small = *scene;
+    struct suite_scene whole = *scene;
+    for (int k = 0; k < o->num_engines; k++)
+        if (o->engine[k] >= CONVERGE_DESCRIBED)
+            whole.filter = o->described[0].filter;
+    struct suite_scene small = whole;
     small.width /= o->shrink;
     small.height /= o->shrink;
     const struct converge_job job = {.scene = &small,
                                      .pathtracer = o->pathtracer,
                                      .dir = r->dir,
                                      .share_dir = o->share_dir,
+                                     .described = o->described,
                                      .seed = o->seed,
                                      .threads = o->threads,
                                      .timeout_s = o->timeout_s,
                                      .replicates = o->replicates};
     struct converge_reference ref;
     char name[64];
-    if (!load_reference(r, scene, from, &job, &ref, name, e))
+    if (!load_reference(r, &whole, from, &job, &ref, name, e))
         return false;
     json_t *depths = NULL;
     struct err why;
-    if (o->depth_spp > 0 && !depth_ladder_measure(&job, suite_reference_of(from, "truth"),
-                                                  o->depth_spp, &depths, &why)) {
+    bool ours = false;
+    for (int k = 0; k < o->num_engines; k++)
+        ours |= o->engine[k] < CONVERGE_REFERENCES;
+    if (ours && o->depth_spp > 0 &&
+        !depth_ladder_measure(&job, suite_reference_of(from, "truth"), o->depth_spp, &depths,
+                              &why)) {
         if (err_is_of_memory(&why)) {
             convergence_rate_reference_free(&ref);
             return err_set(e, "%s", why.msg);
         }
         depths = json_pack("{s:s}", "error", why.msg);
     }
-    struct ladder ladder[CONVERGE_NUM_ENGINES] = {0};
+    struct ladder ladder[CONVERGE_MAX_ENGINES] = {0};
     json_t *engines = json_array(), *ratios = json_array();
-    for (int k = 0; k < CONVERGE_NUM_ENGINES; k++)
-        if (o->engine[k]) {
-            climb(r, &job, k, &ref, &ladder[k]);
-            json_array_append_new(engines, engine_json(r, k, &ladder[k]));
-        }
-    for (int a = 0; a < CONVERGE_NUM_ENGINES; a++)
-        for (int b = a + 1; b < CONVERGE_NUM_ENGINES; b++)
+    for (int k = 0; k < o->num_engines; k++) {
+        climb(r, &job, o->engine[k], &ref, &ladder[k]);
+        json_array_append_new(engines, engine_json(r, o->engine[k], &ladder[k], &ref));
+    }
+    for (int a = 0; a < o->num_engines; a++)
+        for (int b = a + 1; b < o->num_engines; b++)
             if (ladder[a].present && ladder[b].present)
-                json_array_append_new(ratios, ratio_json(r, a, &ladder[a], b, &ladder[b]));
+                json_array_append_new(
+                    ratios, ratio_json(r, o->engine[a], &ladder[a], o->engine[b], &ladder[b]));
     json_t *j = json_pack("{s:s, s:s, s:i, s:i, s:i, s:i, s:s, s:f, s:f, s:f, s:f, s:o, s:o, s:o*}",
                           "scene", scene->name, "title", scene->title, "width", small.width,
                           "height", small.height, "depth", scene->depth, "replicates",
                           o->replicates, "reference", name, "reference_noise", sqrt(ref.noise),
                           "alpha", r->alpha, "margin", o->margin, "slope_margin", o->slope_margin,
                           "engines", engines, "ratios", ratios, "depths", depths);
-    for (int k = 0; k < CONVERGE_NUM_ENGINES; k++)
+    for (int k = 0; k < o->num_engines; k++)
         free(ladder[k].version);
     convergence_rate_reference_free(&ref);
     return json_array_append_new(convergence, j) == 0;
@@ -287,9 +335,8 @@ static bool run_scene(const struct run *r, const struct suite_scene *scene, json
 static double alpha_of_one(const struct converge_options *o)
 {
     int num = 0;
-    for (int k = 0; k < CONVERGE_NUM_ENGINES; k++)
-        if (o->engine[k])
-            num += (is_judged(k) ? 1 : 0) + (is_independent(k) ? 1 : 0);
+    for (int k = 0; k < o->num_engines; k++)
+        num += (is_judged(o->engine[k]) ? 1 : 0) + (is_slope_judged(o->engine[k]) ? 1 : 0);
     return o->alpha / (o->num_scenes * (num > 0 ? num : 1));
 }
 

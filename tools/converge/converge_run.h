@@ -4,30 +4,25 @@
 
 #include "converge_engine.h"
 
-enum { CONVERGE_MAX_SCENES = 64 };
-
-/* The reference for the squared error. AUTO: the closed form if the scene has one, else the golden of the first
- * engine of engine_table.h that has one, else a long run of our own. That one cannot show an error of our renderer
- * that does not depend on the number of samples. */
-enum converge_against {
-    AGAINST_AUTO,
-    AGAINST_TRUTH,
-    AGAINST_GOLDENS, /* of the first engine, and so on */
-    AGAINST_OWN = AGAINST_GOLDENS + NUM_ENGINES_WITH_GOLDENS
-};
-extern const char *const converge_against_names[]; /* end with NULL */
+enum { CONVERGE_MAX_SCENES = 64, CONVERGE_MAX_ENGINES = CONVERGE_OWN + CONVERGE_MAX_DESCRIBED };
 
 struct converge_options {
     const char *suite_dir, *golden_dir, *share_dir, *out_dir, *pathtracer;
     const char *scene[CONVERGE_MAX_SCENES];
     int num_scenes;
-    bool engine[CONVERGE_NUM_ENGINES];
+    enum converge_engine engine[CONVERGE_MAX_ENGINES]; /* different ones */
+    int num_engines;
+    const struct engine
+        *described; /* of the engines from CONVERGE_DESCRIBED on; all have the same pixel filter */
     int ladder[CONVERGE_MAX_RUNGS]; /* ascending */
     int num_rungs;                  /* at least 3 */
     int replicates;                 /* at least 4 */
     int depth_spp; /* samples per pixel of the depth ladder (depth_ladder.h); 0: none */
     int shrink;    /* width and height of images are divided by this */
-    enum converge_against against;
+    /* The reference for the squared error: the name of one of the scene's, "own" for a long run of ours, or "auto": the
+     * closed form if the scene has one, else the first that is stored, else "own". That one cannot show an error of our
+     * renderer that does not depend on the number of samples. */
+    const char *against;
     uint32_t seed;
     double alpha;        /* of all judgements of the run together */
     double margin;       /* largest RMS bias that counts as none, relative */
@@ -35,7 +30,6 @@ struct converge_options {
     int threads;
     double timeout_s;
     bool quiet;
-    bool engine_chosen, help; /* of the command line */
 };
 
 /* Fills *results (results.h; a new reference): no claims, but "convergence" (convergence_results.h). Writes no

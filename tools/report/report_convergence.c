@@ -101,6 +101,10 @@ static void write_scene(FILE *f, const json_t *scene)
     html_table_open(f, NULL, "Table of quantities", "Engine|Quantity|>Value and interval|Verdict");
     convergence_results_rows(scene, write_row, f);
     html_table_close(f);
+    json_each(j, json_object_get(scene, "engines"))
+        if (convergence_results_reason(j) != NULL)
+            html_print(f, "<p class=\"caption\"><b>%s</b>: %s.</p>\n", member_text(j, "engine"),
+                       convergence_results_reason(j));
     write_rungs(f, scene);
     fputs("</section>\n", f);
 }

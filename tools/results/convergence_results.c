@@ -165,6 +165,11 @@ void convergence_results_rows(const json_t *scene,
         ratio_rows(&s, member_text(scene, "scene"), json_array_get(ratios, k));
 }
 
+const char *convergence_results_reason(const json_t *engine)
+{
+    return json_is_true(json_object_get(engine, "passed")) ? NULL : member_text(engine, "reason");
+}
+
 static void print_rungs(FILE *f, const json_t *scene)
 {
     fprintf(f, "\n%-17s %6s  %-26s %-26s %8s %9s  %s\n", "engine", "spp", "RMSE % [interval]",
@@ -204,6 +209,9 @@ void convergence_results_print(FILE *f, const json_t *convergence)
         print_rungs(f, s);
         fprintf(f, "\n%-17s %-38s %-28s %s\n", "engine", "quantity", "value [interval]", "verdict");
         convergence_results_rows(s, print_row, f);
+        json_each(j, json_object_get(s, "engines"))
+            if (convergence_results_reason(j) != NULL)
+                fprintf(f, "\n%s: %s\n", member_text(j, "engine"), convergence_results_reason(j));
     }
 }
 

@@ -28,6 +28,9 @@ struct convergence_row {
 void convergence_results_rows(const json_t *scene,
                               void (*row)(void *ctx, const struct convergence_row *r), void *ctx);
 
+/* Why an element of "engines" that has verdicts did not pass; NULL if it passed or could not be judged. */
+const char *convergence_results_reason(const json_t *engine);
+
 /* Rungs, then rows, of every scene, for a terminal. */
 void convergence_results_print(FILE *f, const json_t *convergence);
 /* The rows as a Markdown table. */

@@ -46,6 +46,10 @@ bool convergence_rate_reference_init(struct converge_reference *r, const struct 
     if (m->width % shrink != 0 || m->height % shrink != 0)
         return err_set(e, "an image of %d x %d pixels cannot be made %d times smaller", m->width,
                        m->height, shrink);
+    if (m->sharing > 1 && shrink > 1)
+        return err_set(e, "an image whose pixels share samples cannot be made smaller");
+    /* Such moments have variances that are larger by this factor than those of their pixels. */
+    const double sharing = fmax(1, m->sharing);
     int width = m->width / shrink, height = m->height / shrink;
     size_t size = 3 * (size_t)width * (size_t)height;
     *r = (struct converge_reference){.size = size};
@@ -72,13 +76,13 @@ bool convergence_rate_reference_init(struct converge_reference *r, const struct 
     for (size_t i = 0; i < size; i++) {
         r->unit[i] = fmax(r->mean[i], DARK_SHARE * scale);
         r->mean[i] /= r->unit[i];
-        r->var[i] /= r->unit[i] * r->unit[i];
+        r->var[i] /= r->unit[i] * r->unit[i] * sharing;
         r->noise += r->var[i] / (double)size;
         /* (mean - truth)^2 scatters by 2 v^2, the estimate of v by 2 v^2/(n-1). */
         if (r->var[i] > 0)
             pixel_sd += r->var[i] * sqrt(2 + 2 / (n[i] - 1));
         if (i % 3 == 2) {
-            r->noise_var += pixel_sd * pixel_sd / ((double)size * (double)size);
+            r->noise_var += sharing * pixel_sd * pixel_sd / ((double)size * (double)size);
             pixel_sd = 0;
         }
     }
@@ -271,6 +275,14 @@ enum verdict convergence_rate_slope_verdict(struct estimate slope, double alpha,
     if (i.lo > -0.5 || i.hi < -0.5)
         return VERDICT_DIFFERENT;
     return (i.hi - i.lo) / 2 > half_width ? VERDICT_INCONCLUSIVE : VERDICT_EQUIVALENT;
+}
+
+enum verdict convergence_rate_slope_at_most(struct estimate slope, double alpha, double half_width)
+{
+    struct interval i = estimate_interval(slope, alpha);
+    if (i.lo > -0.5)
+        return VERDICT_DIFFERENT;
+    return i.hi > -0.5 + half_width ? VERDICT_INCONCLUSIVE : VERDICT_EQUIVALENT;
 }
 
 struct interval convergence_rate_floor(const struct rung *r, double alpha)

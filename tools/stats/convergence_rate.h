@@ -28,8 +28,8 @@ struct converge_reference {
 };
 
 /* The reference for images `shrink` times smaller on both sides: box averages, which with a box
- * filter of one pixel are the smaller image exactly. Fails where shrink does not divide the size,
- * on stratified moments, on fewer than two observations, and on a black image. */
+ * filter of one pixel are the smaller image exactly. Fails where shrink does not divide the size or pixels share
+ * samples, on stratified moments, on fewer than two observations, and on a black image. */
 NODISCARD bool convergence_rate_reference_init(struct converge_reference *r,
                                                const struct moments *m, int shrink, struct err *e);
 void convergence_rate_reference_free(struct converge_reference *r);
@@ -74,6 +74,9 @@ double convergence_rate_slope_dof(const struct rung *rung, int num);
 /* Is the slope -1/2, as of independent samples? DIFFERENT if the 1 - alpha interval does not contain it,
  * INCONCLUSIVE if it does but is wider than +-half_width, else EQUIVALENT. */
 enum verdict convergence_rate_slope_verdict(struct estimate slope, double alpha, double half_width);
+/* Is it at most -1/2, as of any samples without a bias? DIFFERENT if the whole interval lies above, EQUIVALENT if
+ * it lies below -1/2 + half_width, else INCONCLUSIVE. */
+enum verdict convergence_rate_slope_at_most(struct estimate slope, double alpha, double half_width);
 
 /* The interval of the bias that is left at a rung: sqrt of the 1 - 2 alpha interval of B^2, cut at 0. */
 struct interval convergence_rate_floor(const struct rung *r, double alpha);

@@ -226,22 +226,6 @@ static bool add_before(const struct side_image *before, struct side_image *more,
     return true;
 }
 
-/* Was the reference stored with the scene's pixel filter? The engine's description in the manifest names it; else it is
- * the box of one pixel. */
-static bool has_filter_of(const struct side *s, const json_t *manifest, struct err *e)
-{
-    const json_t *settings = json_object_get(manifest, "settings");
-    const char *stored = member_text(json_object_get(settings, "description"), "filter");
-    struct pixel_filter filter;
-    char has[PIXEL_FILTER_TEXT], wanted[PIXEL_FILTER_TEXT];
-    if (!pixel_filter_parse(stored != NULL ? stored : "box", &filter, e))
-        return err_prefix(e, "%s, %s: the manifest", s->scene->name, s->name);
-    pixel_filter_print(&filter, has);
-    pixel_filter_print(&s->scene->filter, wanted);
-    return strcmp(has, wanted) == 0 || err_set(e, "%s, %s: stored with the pixel filter %s, not %s",
-                                               s->scene->name, s->name, has, wanted);
-}
-
 static void add_words(json_t *words, const char *const *word)
 {
     for (; *word != NULL; word++)
@@ -326,7 +310,7 @@ static bool read_golden(const struct validation *v, struct side *s, struct side_
 {
     const char *dir = v->opt->golden_dir;
     if (golden_read(dir, s->scene, s->ref, &out->m, &out->manifest, e))
-        return has_filter_of(s, out->manifest, e);
+        return golden_has_filter(out->manifest, s->scene, s->name, e);
     struct golden g;
     golden_inspect(dir, s->scene, s->ref, &g);
     if (v->suite.is_own && (g.state == GOLDEN_MISSING || g.state == GOLDEN_STALE))

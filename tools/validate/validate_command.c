@@ -113,17 +113,11 @@ static bool ask_own_suite(struct validate_command *c, struct err *e)
            err_set(e, "%s/suite.json names no 'engine': give --engine FILE", c->opt.suite_dir);
 }
 
-/* A name without a path is that of a description in SHARE/engines. */
 static bool load_engine(struct validate_command *c, struct err *e)
 {
-    const char *file = c->engine_file;
+    const char *file = c->engine_file != NULL ? c->engine_file : c->own_engine;
     c->opt.engine = &c->engine;
-    if (file == NULL)
-        return engine_load(c->own_engine, &c->engine, e);
-    return engine_load(strpbrk(file, "./") != NULL
-                           ? file
-                           : fs_path("%s/engines/%s.json", c->opt.share_dir, file).s,
-                       &c->engine, e);
+    return engine_load_named(file, c->opt.share_dir, &c->engine, e);
 }
 
 static void print_not_expressible(const json_t *results)
