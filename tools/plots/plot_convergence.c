@@ -85,6 +85,7 @@ void plot_convergence(FILE *f, const json_t *scene, bool against_time)
     struct plot p = plot_sized(f, 340, 240);
     size_t k;
     p.x = (struct plot_axis){.label = what, .is_log = true, .has_grid = true};
+    p.left = 70; /* for "0.001 %" */
     p.y = (struct plot_axis){.label = "relative RMS error of an image",
                              .is_log = true,
                              .has_grid = true,

@@ -59,7 +59,7 @@ static void write_caption(FILE *f, const json_t *depths)
     }
     fprintf(
         f,
-        "<figcaption><b>Depth ladder.</b> The image's mean if paths end after so many bounces, %.0f "
+        "<figcaption><b>Depth ladder</b> of our path tracer. The image's mean if paths end after so many bounces, %.0f "
         "samples per pixel: 0 is what lamps show of themselves, 1 adds direct light, each further step what one "
         "more bounce brings. Late steps must shrink; a step that is missing, or comes one too late, is a wrong depth. "
         "Strokes are ±2 standard errors. ",
