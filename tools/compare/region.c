@@ -218,19 +218,24 @@ static double t_of_least_p(double dof, double skew)
     return root[0];
 }
 
-static double log10_p_at(const struct measured *m, double t, double skew)
+static double log10_p_at(double dof, double t, double skew)
 {
-    return stats_t_log10_p(t, m->dof) + skew_at(skew, t) / log(10);
+    return stats_t_log10_p(t, dof) + skew_at(skew, t) / log(10);
 }
 
-/* A larger t is no likelier than a smaller one, so that it has the least p of these. */
-static double raised_log10_p(const struct measured *m, double t, double skew)
+double region_raised_log10_p(double t, double dof, double skew)
 {
-    const double least = t_of_least_p(m->dof, skew);
-    double log10_p = log10_p_at(m, t, skew);
+    const double least = t_of_least_p(dof, skew);
+    double log10_p = log10_p_at(dof, t, skew);
     if (least < t)
-        log10_p = fmin(log10_p, log10_p_at(m, least, skew));
+        log10_p = fmin(log10_p, log10_p_at(dof, least, skew));
     return fmin(0, fmax(region_smallest_log10_p, log10_p));
+}
+
+bool region_skew_is_testable(double skew, double x, bool *raised)
+{
+    *raised = skew_factor(skew, x) > skew_limit;
+    return !*raised || (skew_factor(skew, x) <= skew_limit_raised && skew * x <= largest_gx);
 }
 
 double region_log10_p(const struct judge *j, const struct measured *m, int channel)
@@ -238,7 +243,7 @@ double region_log10_p(const struct judge *j, const struct measured *m, int chann
     double excess = excess_of(m);
     if (m->noise_free)
         return log10_p_noise_free(j, m, excess, channel);
-    double log10_p = raised_log10_p(m, fmax(0, region_excess_t(m)), skew_of_p(j, m));
+    double log10_p = region_raised_log10_p(fmax(0, region_excess_t(m)), m->dof, skew_of_p(j, m));
     return m->silent || m->may_have_missed ? fmax(log10_p, log10_p_missed(j, m, excess, channel))
                                            : log10_p;
 }
@@ -270,7 +275,7 @@ double region_log10_p_equal(const struct judge *j, const struct measured *m, int
     double excess = fmax(0, fabs(m->d) - m->tolerance);
     if (m->noise_free)
         return log10_p_noise_free(j, m, excess, channel);
-    double log10_p = raised_log10_p(m, excess / sqrt(m->v), m->skew);
+    double log10_p = region_raised_log10_p(excess / sqrt(m->v), m->dof, m->skew);
     return m->may_have_missed ? fmax(log10_p, log10_p_missed(j, m, excess, channel)) : log10_p;
 }
 

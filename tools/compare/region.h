@@ -70,6 +70,12 @@ struct measured region_measure_weighted(const struct judge *j, const struct cell
  * image, nor where the region's own skewness already forbids a test. */
 void region_look_around(const struct judge *j, struct measured *m, const struct cell *around);
 
+/* Two-sided log10 p of Student's t, raised by the factor that skewness may cause at t; a larger t is no likelier than
+ * a smaller one, so that it has the least p of these. skew 0: as it is. */
+double region_raised_log10_p(double t, double dof, double skew);
+/* Is a p trusted at the critical value x, if it is raised where *raised is set? These are the rules below. */
+bool region_skew_is_testable(double skew, double x, bool *raised);
+
 /* region_is_normal(): the region is not silent, and its skewness factor |g| x^3 / 3 is at most 0.2
  * at the critical value x. region_testable(): silent regions pass, too, and so do factors up to 4
  * with |g| x <= 0.3, if the skewness of the surroundings is within these bounds as well.

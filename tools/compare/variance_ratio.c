@@ -6,8 +6,7 @@
 #include <math.h>
 #include <string.h>
 
-static const double skew_limit = 0.2; /* as for regions */
-static const double skew_limit_widened = 1;
+static const double skew_limit_widened = 1; /* as for regions */
 /* The chance that two independent renders agree in all moments of a pixel in which either has noise.
  * Two-valued laws agree most: for n = 3 observations, at even odds, 2 (3/8)^2 / (1 - 1/16) = 0.3, less for
  * more observations. */
@@ -81,6 +80,21 @@ static double skewness(const struct pixels *s, double r)
     return square > 0 ? fabs(cube) / pow(square, 1.5) : 0;
 }
 
+/* Standard error of that: the root of the sum of sixth powers. Where few pixels have most of the noise, their cubes may
+ * cancel by luck. */
+static double skewness_se(const struct moments *a, const struct moments *b, double paths_a,
+                          double paths_b, double r)
+{
+    double square = 0, sixth = 0;
+    size_t pixels = (size_t)a->width * (size_t)a->height;
+    for (size_t p = 0; p < pixels; p++) {
+        double u = paths_a * variance(a, p) - r * paths_b * variance(b, p);
+        square += u * u;
+        sixth += u * u * u * u * u * u;
+    }
+    return square > 0 ? sqrt(sixth) / pow(square, 1.5) : 0;
+}
+
 /* Fieller's interval: all r that are not rejected. |t| <= x is u^2 <= k square, a quadratic in r. */
 static bool interval(const struct pixels *s, double x, struct variance_ratio *out)
 {
@@ -119,11 +133,14 @@ struct variance_ratio variance_ratio_test(const struct moments *a, const struct 
 
     double limit = 1 + j->opt.margin_variance;
     double r = out.ratio > limit ? limit : out.ratio < 1 / limit ? 1 / limit : out.ratio;
-    double guard = stats_t_of_z(j->z_guard[STATISTIC_VARIANCE], s.num - 1);
-    *testable = g * guard * guard * guard / 3 <= skew_limit;
-    double t = fmin(1e9, fabs(student(&s, r)));
+    const double guard = stats_t_of_z(j->z_guard[STATISTIC_VARIANCE], s.num - 1),
+                 t = fmin(1e9, fabs(student(&s, r)));
+    bool raised;
+    if (j->opt.margin_variance > 0)
+        g += skewness_se(a, b, paths_a, paths_b, out.ratio);
+    *testable = region_skew_is_testable(g, guard, &raised);
     if (*testable)
-        *log10_p = fmax(region_smallest_log10_p, stats_t_log10_p(t, s.num - 1));
+        *log10_p = region_raised_log10_p(t, s.num - 1, raised ? g : 0);
     return out;
 }
 

@@ -507,7 +507,7 @@ TEST(test_variance_ratio)
     assert_true(lower_bound(level, CLAIMS) <= 0.01);
     assert_true(edge <= level);
     assert_true(tested >
-                CLAIMS / 2); /* the skewness of 1024 pixels is not always known well enough */
+                0.99 * CLAIMS); /* else INCONCLUSIVE, 20 standard errors beyond the margin */
     assert_int_equal(found, tested);
 }
 

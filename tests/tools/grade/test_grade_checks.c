@@ -353,7 +353,8 @@ TEST(tiles_of_rare_bright_samples_are_judged)
 
 /* Points follow bias: variance 0.1 to 100 times ours costs nothing and hides nothing. H0: a right program loses points with at most
  * 1e-5 a check; 48 programs, none may (chance of one below 5e-4). Control: 2.5 times the margin off, or a dark square, all
- * lost; no more runs for programs as noisy as ours. */
+ * lost; no more runs for programs as noisy as ours. At 100 times the variance a dark square may look as if it had missed
+ * rare bright samples: found 19 times of 20 (95 of 100 seeds), so of 12 at least 8 (fewer have a chance of 2e-4). */
 TEST(points_follow_bias_not_variance)
 {
     static const double noise[] = {0.1, 1, 10, 100};
@@ -371,10 +372,14 @@ TEST(points_follow_bias_not_variance)
         printf("variance x %g: at most %d runs\n", noise[i], most);
         assert_true(noise[i] > 1 || most == 1);
         for (int k = 0; k < 2; k++) {
-            OWN(result) r = buy(k == 0 ? &bright : &dark, noise[i], &runs);
-            if (r.share > 0 || r.more > 0)
-                fail_msg("variance x %g, bug %d: %g left after %d runs: %s", noise[i], k, r.share,
-                         runs, r.seen);
+            const int programs = k == 1 && noise[i] == 100 ? 12 : 1;
+            int found = 0;
+            for (int program = 0; program < programs; program++) {
+                OWN(result) r = buy(k == 0 ? &bright : &dark, noise[i], &runs);
+                found += r.share == 0 && r.more == 0;
+            }
+            if (found < (programs > 1 ? 8 : 1))
+                fail_msg("variance x %g, bug %d: found in %d of %d", noise[i], k, found, programs);
         }
     }
 }
@@ -561,9 +566,10 @@ TEST(two_estimators_agree_or_not)
 {
     const struct bug bright = {.scale = 1.2, .square = 1, .noise = 1},
                      noisy = {.scale = 1, .square = 1, .noise = 0.3};
-    const double spp[] = {SPP, SPP};
-    expect_share(check(CHECK_AGREE, 2, (const struct bug *const[]){&none, &noisy}, spp, NULL, 1e-5),
-                 1, 1);
+    /* At 4 times the samples no interval is as long as the margins, which would cost points, too. */
+    const double spp[] = {SPP, SPP}, many[] = {4 * SPP, 4 * SPP};
+    expect_share(
+        check(CHECK_AGREE, 2, (const struct bug *const[]){&none, &noisy}, many, NULL, 1e-5), 1, 1);
     expect_share(
         check(CHECK_AGREE, 2, (const struct bug *const[]){&none, &bright}, spp, NULL, 1e-5), 0, 0);
     /* Of two black images, which are the same file, no option is to blame. */
