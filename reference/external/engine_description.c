@@ -3,6 +3,7 @@
 
 #include "reference/base/json_file.h"
 #include "reference/suite/features.h"
+#include "reference/suite/suite_own.h"
 #include "reference/base/json_node.h"
 #include "renderer/base/fs.h"
 
@@ -292,6 +293,15 @@ bool engine_load_named(const char *name, const char *share_dir, struct engine *o
 {
     const bool is_file = strpbrk(name, "./") != NULL;
     return engine_load(is_file ? name : fs_path("%s/engines/%s.json", share_dir, name).s, out, e);
+}
+
+bool engine_fits_suite(const struct engine *en, const char *suite_dir, struct err *e)
+{
+    return !en->takes_files || suite_own_is(suite_dir) ||
+           err_set(e,
+                   "%s is for a suite of its own (\"format\": \"file\"), and %s has no "
+                   "suite.json: give --suite DIR",
+                   en->file, suite_dir);
 }
 
 void engine_free(struct engine *en)

@@ -53,6 +53,8 @@ NODISCARD bool engine_load(const char *path, struct engine *out, struct err *e);
 NODISCARD bool engine_load_named(const char *name, const char *share_dir, struct engine *out,
                                  struct err *e);
 void engine_free(struct engine *en);
+/* Fails on "format": "file" where suite_dir is no suite of one's own. */
+NODISCARD bool engine_fits_suite(const struct engine *en, const char *suite_dir, struct err *e);
 
 /* The value of a placeholder. */
 struct engine_value {

@@ -777,6 +777,12 @@ sed 's/^  spp 16/  spp sixteen/; s/^check point 4/check point 4 5/' tools/rubric
 expect "grade: a mistake has its line" 3 "wrong.rubric:1[0-9]: spp" "$san_assay" grade --check-rubric "$tmp/wrong.rubric"
 expect "grade: mistakes are counted" 3 "mistakes" "$san_assay" grade --check-rubric "$tmp/wrong.rubric"
 expect "grade: no submission" 3 "no submission" "$san_assay" grade tools/rubrics/template.rubric
+# The folder of a grade is made anew: nobody's work is removed for it.
+mkdir -p "$tmp/handed/ada" "$tmp/other/ada" && touch "$tmp/handed/ada/a.png" "$tmp/other/ada/mine"
+expect "grade: into the folder of the submissions" 3 "the grade of .*handed/ada would take its place" "$san_assay" grade -o "$tmp/handed" tools/rubrics/template.rubric "$tmp/handed"/*
+expect "grade: the same from within" 3 "the grade of ada would take its place" env -C "$tmp/handed" "$san_assay" grade -o . "$PWD/tools/rubrics/template.rubric" ada
+expect "grade: over a folder of somebody else" 3 "other/ada is there already, and no grade" "$san_assay" grade -o "$tmp/other" tools/rubrics/template.rubric "$tmp/handed/ada"
+tell "grade: all of them are still there" "$(ls "$tmp/handed/ada/a.png" "$tmp/other/ada/mine" 2>&1 >/dev/null)"
 cp tests/end_to_end/quick.rubric "$tmp/quick.rubric"
 mkdir -p "$tmp/subs" "$tmp/subs/images" "$tmp/subs/empty" "$tmp/subs/source" "$tmp/subs/linked"
 sub() { # NAME: a shell script from stdin

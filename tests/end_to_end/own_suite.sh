@@ -43,6 +43,13 @@ sed -i 's/^exec pathtracer/exec once "$7" pathtracer/' begun/mine.sh # the same 
 expect "init in a folder whose name a shell would split" 0 "\`assay validate --suite 'it'.''s mine'\` is green" assay init "it's mine"
 tell "so does the workflow there quote it" "$(grep -q "validate --suite 'it'.''s mine' --out" "it's mine/renders.yml" || echo "it does not")"
 expect "init does not write over what is there" 3 "begun/suite.json is there already" assay init begun
+# Beside files of the user's, first where it fails.
+mkdir -p beside/build && touch beside/build/precious beside/golden
+expect "init that fails" 0 "^3$" sh -c 'assay init beside >out 2>&1; echo $?'
+tell "leaves what was there" "$(find beside -mindepth 1 | sort | diff - <(printf 'beside/build\nbeside/build/precious\nbeside/golden\n'))"
+rm beside/golden
+expect "and can be tried again" 0 "is green" assay init beside
+tell "beside a build folder" "$(ls beside/build/precious 2>&1 >/dev/null; find beside -name 'init-*')"
 expect "it is green from another folder" 0 "result: all as it should be, 1 the same" assay validate --suite begun --out report
 tell "a place that does not stand out is not named" "$(grep -o '0 x 0 pixels' report/results.json | head -n 1; grep -q '"what": "nothing stands out"' report/results.json || echo "nothing is said")"
 tell "validate says where it looked" "$(grep -qx "suite $tmp/free/begun (1 scene), goldens $tmp/free/begun/golden, engine $tmp/free/begun/mine.json" "$tmp/err" || cat "$tmp/err")"
@@ -52,6 +59,7 @@ expect "the command of a claim runs as it is printed" 0 "result: all as it shoul
 # Printed commands are for whoever reads the page, in whatever folder.
 expect "convergence of the suite's engine" 0 "^mine *slope of RMSE .*EQUIVALENT" \
     assay converge -q --suite begun -k 8 --ladder 1,4,16 --slope-margin 0.25 --margin 0.1 -o converged cornell
+expect "which is not for ours" 3 "begun/mine.json is for a suite of its own" assay converge --suite "$top/reference/scenes" --engine begun/mine.json 13_square_patch
 mkdir elsewhere
 expect "in another folder, too" 0 "result: all as it should be, 1 the same" env -C elsewhere bash -c "$again"
 expect "validate in the folder itself" 0 "result: all as it should be, 1 the same" env -C begun assay validate -q --out "$tmp/free/report"

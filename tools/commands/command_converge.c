@@ -75,8 +75,9 @@ static bool add_described(struct converge_command *c, const char *name, struct e
         return err_set(e,
                        "%s: its pixel filter is %s, that of %s %s: there is one reference for all",
                        en->name, filter[1], c->described[0].name, filter[0]);
-    return en->filter.radius <= 0 || c->o.shrink == 1 ||
-           err_set(e, "%s: --shrink is for pixel filters of one box", en->name);
+    if (en->filter.radius > 0 && c->o.shrink > 1)
+        return err_set(e, "%s: --shrink is for pixel filters of one box", en->name);
+    return engine_fits_suite(en, c->o.suite_dir, e);
 }
 
 /* Finds the engines that are named, or those that are measured by default. */

@@ -7,9 +7,11 @@
 #include "tools/results/results.h"
 #include "commands.h"
 
+#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 struct settings {
     const char *dir[1];
@@ -34,22 +36,34 @@ int command_init(int argc, char **argv, struct err *e)
     if (s.help)
         return 0;
     struct path suite = fs_path("%s", s.dir[0]), engine = fs_path("%s/mine.json", s.dir[0]);
-    struct path work = fs_path("%s/build/work", s.dir[0]);
-    struct path candidate = fs_path("%s/build/golden-candidate", s.dir[0]);
+    struct path temp = fs_path("%s/init-XXXXXX", s.dir[0]);
+    if (!starter_write(s.dir[0], at.share.s, e))
+        return EXIT_NOT_JUDGED;
+    if (mkdtemp(temp.s) == NULL) {
+        starter_remove(s.dir[0]);
+        err_set(e, "%s: cannot make a directory in it: %s", s.dir[0], strerror(errno));
+        return EXIT_NOT_JUDGED;
+    }
+    struct path work = fs_path("%s/work", temp.s), candidate = fs_path("%s/candidate", temp.s);
     char word[][12] = {"golden", "render",  "--suite", "--engine", "--work",
                        "--out",  "approve", "--from",  "--new",    "--all"};
     char *render[] = {word[0], word[1], word[2], suite.s,     word[3], engine.s,
                       word[4], work.s,  word[5], candidate.s, NULL};
     char *approve[] = {word[0],     word[6], word[2], suite.s, word[7],
                        candidate.s, word[8], word[9], NULL};
-    if (!starter_write(s.dir[0], at.share.s, e))
-        return EXIT_NOT_JUDGED;
     int code = command_golden(10, render, e);
     code = code == 0 ? command_golden(8, approve, e) : code;
-    if (code == 0 && !fs_remove_tree(fs_path("%s/build", s.dir[0]).s, e))
+    if (code == 0 && !fs_remove_tree(temp.s, e))
         code = EXIT_NOT_JUDGED;
-    if (code != 0)
+    if (code != 0) {
+        /* What a renderer left to look at stays. */
+        struct err ignored;
+        starter_remove(s.dir[0]);
+        if (fs_remove_tree(candidate.s, &ignored))
+            rmdir(work.s);
+        rmdir(temp.s);
         return code;
+    }
     const char *suite_option = strcmp(s.dir[0], ".") != 0 ? "--suite" : NULL;
     char *command =
         shell_quote_join("assay", (const char *[]){"validate", suite_option, s.dir[0], NULL});

@@ -136,9 +136,11 @@ struct variance_ratio variance_ratio_test(const struct moments *a, const struct 
     const double guard = stats_t_of_z(j->z_guard[STATISTIC_VARIANCE], s.num - 1),
                  t = fmin(1e9, fabs(student(&s, r)));
     bool raised;
-    if (j->opt.margin_variance > 0)
-        g += skewness_se(a, b, paths_a, paths_b, out.ratio);
     *testable = region_skew_is_testable(g, guard, &raised);
+    if (*testable && raised) {
+        g += skewness_se(a, b, paths_a, paths_b, out.ratio);
+        *testable = region_skew_is_testable(g, guard, &raised);
+    }
     if (*testable)
         *log10_p = region_raised_log10_p(t, s.num - 1, raised ? g : 0);
     return out;

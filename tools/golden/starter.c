@@ -86,5 +86,15 @@ bool starter_write(const char *dir, const char *share_dir, struct err *e)
                   fs_path("%s/%s", dir, files[i].to).s, files[i].mode, name, bin, e);
     free(name);
     free(bin);
+    if (!ok)
+        starter_remove(dir);
     return ok;
+}
+
+void starter_remove(const char *dir)
+{
+    for (size_t i = 0; i < sizeof files / sizeof *files; i++)
+        unlink(fs_path("%s/%s", dir, files[i].to).s);
+    rmdir(fs_path("%s/scenes", dir).s); /* unless something else is in it, or in dir */
+    rmdir(dir);
 }

@@ -6,7 +6,9 @@
 
 /* Copies share_dir/starter and one of our scenes into dir, which is made. In the files @NAME@ becomes the last part
  * of dir's path, @BIN@ the directory of this program, both quoted for a shell. Fails before it writes anything if one
- * of the files exists. */
+ * of the files exists; after another failure what was written is removed. */
 NODISCARD bool starter_write(const char *dir, const char *share_dir, struct err *e);
+/* Removes what starter_write() wrote, and nothing else. */
+void starter_remove(const char *dir);
 
 #endif

@@ -3,8 +3,10 @@
 #include "renderer/base/cli.h"
 #include "renderer/base/cli_rewrite.h"
 #include "renderer/base/fs.h"
+#include "tools/submission/submission.h"
 
 #include <errno.h>
+#include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -73,6 +75,24 @@ static const struct cli_option options[] = {
     {'h', "help", "", "print this", TO(help), .stops = true},
     {.read = read_word}};
 
+/* May OUT/ID be removed, to be made anew? Not if the submission is in it, nor if it is of somebody else. */
+static bool check_place(const struct grade_settings *s, const char *submission, struct err *e)
+{
+    char id[128], place[PATH_MAX], from[PATH_MAX];
+    submission_id(submission, id);
+    const struct path out = fs_path("%s/%s", s->out, id);
+    if (realpath(out.s, place) == NULL || realpath(submission, from) == NULL)
+        return true;
+    const size_t n = strlen(place);
+    if (strncmp(from, place, n) == 0 && (from[n] == '\0' || from[n] == '/'))
+        return err_set(e, "-o %s: the grade of %s would take its place: give another folder",
+                       s->out, submission);
+    return access(fs_path("%s/grade.json", out.s).s, F_OK) == 0 ||
+           access(fs_path("%s/grades.json", s->out).s, F_OK) == 0 ||
+           access(fs_path("%s/.references", s->out).s, F_OK) == 0 ||
+           err_set(e, "%s is there already, and no grade: give -o another folder", out.s);
+}
+
 bool grade_options_parse(int argc, char **argv, struct grade_settings *s, struct err *e)
 {
     if (!cli_read(options, argc, argv, s, e) || s->help)
@@ -90,6 +110,9 @@ bool grade_options_parse(int argc, char **argv, struct grade_settings *s, struct
     if (s->build_cache != NULL && !s->fill && access(s->build_cache, R_OK | X_OK) != 0)
         return err_set(e, "--build-cache %s: %s; --fill-build-cache makes it from the starter code",
                        s->build_cache, strerror(errno));
+    for (int i = 0; i < s->num && !s->fill && !s->again; i++)
+        if (!check_place(s, s->submission[i], e))
+            return false;
     return s->only_check || s->prepare || s->num > 0 ||
            err_set(e, "no submission given (see --help)");
 }

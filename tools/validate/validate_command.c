@@ -235,11 +235,8 @@ bool validate_command_read(int argc, char **argv, struct validate_command *c, st
         return err_set(e, "no random numbers from the system; give --reference-seed");
     if ((c->engine_file != NULL || c->own_engine[0] != '\0') && !load_engine(c, e))
         return false;
-    if (c->opt.engine != NULL && c->engine.takes_files && !suite_own_is(c->opt.suite_dir))
-        return err_set(
-            e,
-            "%s is for a suite of its own (\"format\": \"file\"), and %s has no suite.json: give --suite DIR",
-            c->engine_file, c->opt.suite_dir);
+    if (c->opt.engine != NULL && !engine_fits_suite(&c->engine, c->opt.suite_dir, e))
+        return false;
     if (c->opt.threads == 0)
         c->opt.threads = cli_processors();
     return true;
