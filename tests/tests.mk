@@ -41,6 +41,8 @@ SANITIZE := -O1 -g1 -fno-omit-frame-pointer -fno-sanitize-recover=all -fsanitize
 # Builds: san with ASan and UBSan; clang for its warnings and for the fuzzers; on demand tsan with ThreadSanitizer and
 # cov with clang's coverage counters.
 $(BUILD)/san/%: private OPT := $(SANITIZE)
+# A library that oiio.so loads may throw: AddressSanitizer has to find the C++ library at the start.
+$(BUILD)/san/%: private LDFLAGS += -Wl,--no-as-needed -lstdc++
 # Files in which tests spend most of their time are worth more optimisation.
 BUSY := renderer/bvh/bvh tools/compare/hint tools/diagnose/bug_fit tools/diagnose/signature tools/exact/permutation tools/grade/difference tools/images/flip
 $(BUSY:%=$(BUILD)/san/%.c.o): OPT = $(SANITIZE:-O1=-O2)

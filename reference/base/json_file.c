@@ -24,7 +24,7 @@ json_t *json_read(const char *path, size_t flags, json_error_t *why)
     char mark[3];
     const bool is_marked = fread(mark, 1, 3, f) == 3 && memcmp(mark, "\xef\xbb\xbf", 3) == 0;
     if (!is_marked)
-        rewind(f);
+        fseek(f, 0, SEEK_SET);
     json_t *root = json_loadf(f, flags, why);
     fclose(f);
     return root;

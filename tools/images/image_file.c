@@ -42,10 +42,10 @@ static bool check_file(const char *path, const struct image_info *info, struct e
                  ((strcmp(info->format, "openexr") == 0 || strcmp(info->format, "hdr") == 0 ||
                    strcmp(info->format, "pnm") == 0) &&
                   is_float);
-    if (strcmp(info->format, "pnm") == 0 && integer) {
-        if (!has_all_codes(path, info))
+    if (strcmp(info->format, "pnm") == 0 && !is_float) {
+        if (!has_all_codes(path, info)) /* then OpenImageIO 2.5 calls it neither 8 nor 16 bits */
             return err_set(e, "%s: the brightest code of a PPM must be 255 or 65535", path);
-        known = true;
+        known = integer;
     }
     if (!known)
         return err_set(e,
