@@ -148,12 +148,14 @@ static bool fold_runs(struct engine_job *j, struct moments *m, struct err *e)
             break;
         replicate_repeats_add(&repeats, px, pixels);
         if (j->en->output == OUTPUT_MEAN && repeats.same >= 0 && !repeats.without_noise)
-            ok = err_set(
-                e, "replicate %d is the same image as an earlier one: the seed has no effect%s",
-                repeats.same,
-                strcmp(j->en->image, "hdr") == 0
-                    ? ", or less than RGBE's 8 bits show: write EXR or PFM"
-                    : "");
+            ok = err_set(e, "replicate %d is the same image as an earlier one: %s%s", repeats.same,
+                         repeats.same > 1
+                             ? "the program has few different images, as if {seed} did not "
+                               "decide all that is random in it"
+                             : "the seed has no effect",
+                         strcmp(j->en->image, "hdr") == 0
+                             ? ", or less than RGBE's 8 bits show: write EXR or PFM"
+                             : "");
         moments_add_image(m, px);
         replicates_add(&seen, px);
         if (j->opt->on_replicate != NULL)

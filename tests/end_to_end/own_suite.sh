@@ -43,6 +43,16 @@ sed -i 's/^exec pathtracer/exec once "$7" pathtracer/' begun/mine.sh # the same 
 expect "init in a folder whose name a shell would split" 0 "\`assay validate --suite 'it'.''s mine'\` is green" assay init "it's mine"
 tell "so does the workflow there quote it" "$(grep -q "validate --suite 'it'.''s mine' --out" "it's mine/renders.yml" || echo "it does not")"
 expect "init does not write over what is there" 3 "begun/suite.json is there already" assay init begun
+# Of two scenes one crashes the renderer: the other's reference is made; a scene without one is not rendered to be told so.
+mkdir -p half/scenes && cp begun/mine.json half && cp begun/scenes/cornell.dae half/scenes/bad.dae && cp begun/scenes/cornell.dae half/scenes/good.dae
+printf '#!/bin/sh\necho "$1" >>"$(dirname "$0")/called"\ncase $1 in *bad*) echo "assertion failed"; exit 7; esac\nexec pathtracer -q -r "$2" "$3" -s "$4" -m "$5" --seed "$6" -f "$7" "$1"\n' >half/mine.sh
+chmod +x half/mine.sh
+echo '{"engine": "mine.json", "margin": 0.5, "references": {"mine": {}}, "scenes": {"bad": {"file": "scenes/bad.dae", "width": 16, "height": 16}, "good": {"file": "scenes/good.dae", "width": 16, "height": 16}}}' >half/suite.json
+expect "a scene that crashes is named" 3 "bad, mine: .*exit status 7: assertion failed" env -C half assay golden render -q --engine mine.json
+tell "and the reference of the other is made" "$(ls half/build/golden-candidate/good/mine.exr 2>&1 >/dev/null)"
+rm half/called
+expect "a reference that is not stored" 3 "no golden of mine" env -C half assay validate -q --only good
+tell "is told before anything is rendered" "$(cat half/called 2>/dev/null)"
 # Beside files of the user's, first where it fails.
 mkdir -p beside/build && touch beside/build/precious beside/golden
 expect "init that fails" 0 "^3$" sh -c 'assay init beside >out 2>&1; echo $?'

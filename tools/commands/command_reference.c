@@ -13,10 +13,9 @@
 
 #include <stdio.h>
 
-static bool make_one(void *ctx, const struct suite_scene *scene, const struct suite_reference *ref,
-                     struct err *e)
+static bool make_one(const struct reference_command *c, const struct suite_scene *scene,
+                     const struct suite_reference *ref, struct err *e)
 {
-    const struct reference_command *c = ctx;
     struct reference_state state;
     struct moments m;
     json_t *manifest;
@@ -25,7 +24,8 @@ static bool make_one(void *ctx, const struct suite_scene *scene, const struct su
         return false;
     if (state.there != NULL)
         return reference_options_keep(c, scene, ref, &state, e);
-    fprintf(stderr, "%s: rendering with %s\n", scene->name, ref->engine);
+    if (!c->quiet)
+        fprintf(stderr, "%s: rendering with %s\n", scene->name, ref->engine);
     if (!reference_render(scene, ref, &state.opt, &m, &manifest, e))
         return false;
     bool ok = reference_options_write(c, scene, ref, state.key, &m, manifest,
@@ -70,10 +70,9 @@ static bool make_noise(const struct reference_command *c, struct err *e)
 }
 
 /* Renders a reference of a suite of one's own with the engine of --engine FILE, even if it is up to date. */
-static bool make_described(void *ctx, const struct suite_scene *scene,
+static bool make_described(const struct reference_command *c, const struct suite_scene *scene,
                            const struct suite_reference *ref, struct err *e)
 {
-    const struct reference_command *c = ctx;
     const struct engine_options opt = {.spp = ref->spp,
                                        .replicates = ref->replicates,
                                        .seed = c->opt.seed,
@@ -88,7 +87,8 @@ static bool make_described(void *ctx, const struct suite_scene *scene,
         printf("%s cannot express %s: %s\n", c->described.name, scene->name, why.msg);
         return true;
     }
-    fprintf(stderr, "%s: rendering %s with %s\n", scene->name, ref->engine, c->described.file);
+    if (!c->quiet)
+        fprintf(stderr, "%s: rendering %s with %s\n", scene->name, ref->engine, c->described.file);
     if (!engine_render(&c->described, scene, &opt, &m, &manifest, e))
         return false;
     json_object_set_new(manifest, "engine", json_string(ref->engine));
@@ -107,6 +107,40 @@ static bool make_described(void *ctx, const struct suite_scene *scene,
     return ok;
 }
 
+/* References that are made one after the other; one that fails does not keep the others from being made. */
+struct making {
+    const struct reference_command *c;
+    int num, failed;
+    struct err first; /* failure */
+};
+
+static bool make_next(void *ctx, const struct suite_scene *scene, const struct suite_reference *ref,
+                      struct err *e)
+{
+    struct making *m = ctx;
+    m->num++;
+    if (m->c->as != NULL ? make_described(m->c, scene, ref, e) : make_one(m->c, scene, ref, e))
+        return true;
+    if (err_is_of_memory(e))
+        return false;
+    printf("%s/%s: not made: %s\n", scene->name, ref->engine, e->msg);
+    if (m->failed++ == 0)
+        m->first = *e;
+    return true;
+}
+
+static bool make_all(const struct reference_command *c, struct err *e)
+{
+    struct making m = {.c = c};
+    if (!reference_options_each(c, make_next, &m, e))
+        return false;
+    if (m.failed > 1)
+        return err_set(e, "%d of %d references were not made; the first: %.900s", m.failed, m.num,
+                       m.first.msg);
+    *e = m.first;
+    return m.failed == 0;
+}
+
 int command_reference(int argc, char **argv, struct err *e)
 {
     struct reference_command c;
@@ -117,10 +151,9 @@ int command_reference(int argc, char **argv, struct err *e)
         argv[0] = name;
         code = command_slurm_run(NULL, argc, argv, NULL, e);
         argv[0] = word;
-    } else if (ok && (c.help || (c.last > 0     ? make_images(&c, e)
-                                 : c.noise      ? make_noise(&c, e)
-                                 : c.as != NULL ? reference_options_each(&c, make_described, &c, e)
-                                                : reference_options_each(&c, make_one, &c, e)))) {
+    } else if (ok && (c.help || (c.last > 0 ? make_images(&c, e)
+                                 : c.noise  ? make_noise(&c, e)
+                                            : make_all(&c, e)))) {
         code = 0;
     }
     reference_options_free(&c);

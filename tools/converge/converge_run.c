@@ -200,7 +200,16 @@ static json_t *verdict_json(const struct run *r, enum converge_engine engine,
                                : VERDICT_EQUIVALENT;
     /* What the reference alone contributes to the interval of the squared bias. */
     const double of_reference = stats_normal_quantile(r->alpha) * sqrt(ref->noise_var);
-    char reason[512], of_slope[160] = "";
+    const double too_much = of_reference / (o->margin * o->margin);
+    char reason[640], of_slope[160] = "", advice[160] = "";
+    if (v == VERDICT_INCONCLUSIVE && vf == VERDICT_INCONCLUSIVE && too_much > 1)
+        snprintf(advice, sizeof advice,
+                 ": the reference is too noisy for this margin (--margin); %.3g times its samples "
+                 "would do",
+                 ceil(2 * too_much));
+    else if (v == VERDICT_INCONCLUSIVE)
+        snprintf(advice, sizeof advice, ": more images (--replicates) would tell%s",
+                 vf == VERDICT_INCONCLUSIVE ? ", or a rung of more samples (--ladder)" : "");
     if (judge_slope)
         snprintf(of_slope, sizeof of_slope,
                  vs == VERDICT_DIFFERENT ? "the slope is not %s-1/2; "
@@ -208,16 +217,13 @@ static json_t *verdict_json(const struct run *r, enum converge_engine engine,
                      ? "the slope is not shown to be %s-1/2 within +-%.3g; "
                      : "the slope is %s-1/2 within +-%.3g; ",
                  is_independent(engine) ? "" : "at most ", o->slope_margin);
-    snprintf(
-        reason, sizeof reason,
-        "%sat %g samples the RMS bias is %s %.3g %%, from %.3g %% to %.3g %%%s", of_slope, top->spp,
-        vf == VERDICT_DIFFERENT      ? "above"
-        : vf == VERDICT_INCONCLUSIVE ? "not shown to be below"
-                                     : "below",
-        100 * o->margin, 100 * fi.lo, 100 * fi.hi,
-        vf == VERDICT_INCONCLUSIVE && of_reference > o->margin * o->margin
-            ? ": the reference is too noisy for this margin (--margin), whatever the replicates"
-            : "");
+    snprintf(reason, sizeof reason,
+             "%sat %g samples the RMS bias is %s %.3g %%, from %.3g %% to %.3g %%%s", of_slope,
+             top->spp,
+             vf == VERDICT_DIFFERENT      ? "above"
+             : vf == VERDICT_INCONCLUSIVE ? "not shown to be below"
+                                          : "below",
+             100 * o->margin, 100 * fi.lo, 100 * fi.hi, advice);
     return json_pack(
         "{s:f, s:o, s:s, s:o, s:s, s:s, s:b, s:s}", "slope", slope.value, "slope_ci",
         json_interval(si.lo, si.hi), "slope_verdict", judge_slope ? verdict_name(vs) : "MEASURED",

@@ -146,7 +146,8 @@ bool noise_record_render(const struct reference_command *c, const struct suite_s
         if (!is_of(scene, k) || (c->engine != NULL && strcmp(c->engine, engine) != 0) ||
             (!c->fresh && (is_there(c->golden, scene, engine) || is_there(c->out, scene, engine))))
             continue;
-        fprintf(stderr, "%s: the noise of %s\n", scene->name, engine);
+        if (!c->quiet)
+            fprintf(stderr, "%s: the noise of %s\n", scene->name, engine);
         const struct recording r = {
             .c = c, .scene = scene, .engine = k, .pathtracer = pathtracer, .made = made};
         json_t *entry = NULL, *all = noise_ladder_load(c->out, scene->name, e);

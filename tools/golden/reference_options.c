@@ -46,6 +46,7 @@ static const struct cli_option options[] = {
     {0, "timeout", "S", "time limit for each engine and scene, seconds (7200)", TO(opt.timeout_s),
      1, 1e6},
     {0, "slurm", "", "run jobs of several replicates each on a Slurm cluster", TO(slurm)},
+    {'q', "quiet", "", "print only what was made", TO(quiet)},
     {'h', "help", "", "print this", TO(help),
      .usage =
          "usage: assay golden render [options]\n"

@@ -16,7 +16,7 @@ struct reference_command {
     struct reference_options opt;
     int seed;        /* negative: none was given */
     int first, last; /* --images; last 0: all */
-    bool fresh, noise, slurm, help;
+    bool fresh, noise, slurm, quiet, help;
     struct suite suite;
 };
 

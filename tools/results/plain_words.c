@@ -161,14 +161,17 @@ struct plain_words plain_words_claim(const json_t *claim)
         snprintf(w.s, sizeof w.s, "%.100s is %.200s%.110s (against %.100s)", a, too_bright(claim).s,
                  scene.s, b);
     else if (strcmp(verdict, "EQUIVALENT") == 0)
-        snprintf(w.s, sizeof w.s, "%.100s is the same%.110s (as %.100s), within %.3g %%", a,
-                 scene.s, b, 100 * member_number(claim, "margin_global"));
-    else if (strcmp(verdict, "INCONCLUSIVE") == 0 && only_the_variance_is_open(claim))
+        snprintf(w.s, sizeof w.s, "%.100s is the same%.110s (as %.100s), within %.3g %%%s", a,
+                 scene.s, b, 100 * member_number(claim, "margin_global"),
+                 member_number(claim, "margin_variance") > 0 ? ", and so is its noise" : "");
+    else if (strcmp(verdict, "INCONCLUSIVE") == 0 && only_the_variance_is_open(claim)) {
+        const char *reason = member_or_empty(claim, "reason"), *mean = strstr(reason, "; mean: ");
+        const int length = mean != NULL ? (int)(mean - reason) : (int)strlen(reason);
         snprintf(w.s, sizeof w.s,
-                 "%.100s has the same mean%.110s (as %.100s), within %.3g %%, but its variance "
-                 "could not be judged",
-                 a, scene.s, b, 100 * member_number(claim, "margin_global"));
-    else if (strcmp(verdict, "INCONCLUSIVE") == 0) {
+                 "%.100s has the same mean%.110s (as %.100s), within %.3g %%, but %.*s", a, scene.s,
+                 b, 100 * member_number(claim, "margin_global"), length < 200 ? length : 200,
+                 reason);
+    } else if (strcmp(verdict, "INCONCLUSIVE") == 0) {
         const struct plain_words more = plain_words_more_samples(claim);
         snprintf(w.s, sizeof w.s, "%.100s is too noisy to tell%.110s (against %.100s)%s%.200s", a,
                  scene.s, b, more.s[0] != '\0' ? ": " : "", more.s);
@@ -213,16 +216,18 @@ static size_t num_scenes(const json_t *claims)
     return num;
 }
 
-/* A few failures: claims, worst outcome first, then stated errors and noise. bad: the number of all failures. */
+/* A few failures: claims, what differs first, then stated errors and noise. bad: the number of all failures. */
 static void print_failures(FILE *f, const json_t *results, size_t bad)
 {
     const json_t *claims = json_object_get(results, "claims");
+    static const enum outcome order[] = {OUTCOME_OPPOSITE, OUTCOME_NOT_JUDGED, OUTCOME_UNDECIDED};
     size_t said = 0, covered = 0;
-    for (enum outcome k = OUTCOME_NOT_JUDGED; k < OUTCOME_AS_EXPECTED; k++)
+    for (size_t o = 0; o < sizeof order / sizeof *order; o++)
         for (size_t i = 0; i < json_array_size(claims) && said < MOST_FAILURES; i++) {
             const json_t *claim = json_array_get(claims, i);
-            const size_t same = k == OUTCOME_NOT_JUDGED ? results_num_with_error(claims, i) : 1;
-            if (results_claim_outcome(claim) != k || same == 0)
+            const size_t same =
+                order[o] == OUTCOME_NOT_JUDGED ? results_num_with_error(claims, i) : 1;
+            if (results_claim_outcome(claim) != order[o] || same == 0)
                 continue;
             fprintf(f, "%s%s", said++ == 0 ? ": " : "; ", plain_words_claim(claim).s);
             covered += same;

@@ -282,7 +282,11 @@ static bool both_of(void *ctx, int stage, const struct moments **a, const struct
                     struct err *e)
 {
     struct pair *p = ctx;
-    if (!one_of(p, p->t->a, stage, &p->image[0], e) || !one_of(p, p->t->b, stage, &p->image[1], e))
+    /* A stored reference first: if there is none, nothing is rendered in vain. */
+    const int first = p->t->b->kind == SIDE_GOLDEN ? 1 : 0;
+    struct side *const side[2] = {p->t->a, p->t->b};
+    if (!one_of(p, side[first], stage, &p->image[first], e) ||
+        !one_of(p, side[!first], stage, &p->image[!first], e))
         return false;
     *a = &p->image[0]->m;
     *b = &p->image[1]->m;

@@ -91,11 +91,14 @@ TEST(how_noisy)
 TEST(a_mean_that_is_decided_is_not_too_noisy_to_tell)
 {
     json_auto_t *c = claim_of("INCONCLUSIVE", "EQUIVALENT", 0, -0.001, 0.001, 3);
-    json_object_update_new(c, json_pack("{sf sf}", "margin_variance", 0.3, "extra_factor", 1.));
+    json_object_update_new(
+        c, json_pack("{sf sf ss}", "margin_variance", 0.3, "extra_factor", 1., "reason",
+                     "the variance could not be tested, being too skewed: it is about 2.75 times "
+                     "that of B; mean: the image lies within 0.2 %"));
     assert_string_equal(
         plain_words_claim(c).s,
-        "mine has the same mean on 12_point_plane (as truth), within 0.2 %, but its "
-        "variance could not be judged");
+        "mine has the same mean on 12_point_plane (as truth), within 0.2 %, but the variance could "
+        "not be tested, being too skewed: it is about 2.75 times that of B");
     json_object_set_new(c, "extra_factor", json_real(1.02));
     assert_string_equal(plain_words_claim(c).s,
                         "mine is too noisy to tell on 12_point_plane (against "
@@ -152,5 +155,13 @@ TEST(three_lines)
     assert_non_null(strstr(
         text, "result: 2 of 2 not as it should be: mine is 1.0 % too bright on 12_point_plane "
               "(against truth); mine is too noisy to tell"));
+    free(text);
+    /* A difference is no less true because something else could not be judged. */
+    text = printed(json_pack("[o{ss ss ss ss ss sb}]",
+                             claim_of("DIFFERENT", "EQUIVALENT", 0.0101, 0, 0, 3), "scene", "16_x",
+                             "a", "mine", "b", "truth", "expected", "EQUIVALENT", "error",
+                             "no light", "passed", 0));
+    assert_non_null(strstr(text, "2 of 2 not as it should be: mine is 1.0 % too bright"));
+    assert_non_null(strstr(text, "; mine could not be judged: no light"));
     free(text);
 }
