@@ -249,6 +249,41 @@ static void print_failures(FILE *f, const json_t *results, size_t bad)
         fprintf(f, "; and %zu more", bad - covered);
 }
 
+/* Of a claim that is inside its margin: the share of the margin that its difference has at least, noise taken off. */
+static double share_of_margin(const json_t *claim)
+{
+    const json_t *ci = json_object_get(claim, "ci");
+    const double lo = json_number_value(json_array_get(ci, 0)),
+                 hi = json_number_value(json_array_get(ci, 1)),
+                 margin = member_number(claim, "margin_global");
+    const bool is_inside = ci != NULL && margin > 0 &&
+                           strcmp(member_or_empty(claim, "verdict"), "EQUIVALENT") == 0 &&
+                           results_claim_outcome(claim) == OUTCOME_AS_EXPECTED;
+    return is_inside ? fmax(lo, -hi) / margin : 0;
+}
+
+/* A difference that matters to nobody, by the margin, is still one: a new version has it, or the margin is too wide. */
+static void print_inside(FILE *f, const json_t *claims)
+{
+    static const double worth_saying = 0.25;
+    const json_t *most = NULL;
+    size_t num = 0;
+    json_each(claim, claims) {
+        num += share_of_margin(claim) > worth_saying;
+        if (share_of_margin(claim) > fmax(worth_saying, most != NULL ? share_of_margin(most) : 0))
+            most = claim;
+    }
+    if (num == 0)
+        return;
+    fprintf(
+        f,
+        "\nnote:   %.100s is %s%.110s (against %.100s), which is not noise, but within its %.3g %%",
+        member_or_empty(most, "a"), amount(member_number(most, "difference")).s, on_scene(most).s,
+        member_or_empty(most, "b"), 100 * member_number(most, "margin_global"));
+    if (num > 1)
+        fprintf(f, "; and %zu more", num - 1);
+}
+
 void plain_words_print(FILE *f, const json_t *results, const char *page)
 {
     const json_t *claims = json_object_get(results, "claims"),
@@ -285,5 +320,6 @@ void plain_words_print(FILE *f, const json_t *results, const char *page)
                 num + num_stated + json_array_size(noise));
         print_failures(f, results, bad);
     }
+    print_inside(f, claims);
     fprintf(f, "\nlook:   %s\n", page);
 }

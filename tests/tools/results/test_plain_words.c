@@ -149,6 +149,14 @@ TEST(three_lines)
         "result: all as it should be, 1 the same within their margins, 1 deliberate mistake found\n"
         "look:   page.html\n");
     free(text);
+    /* +0.15 % +- 0.1 % is at least a quarter of 0.2 %, +0.14 % is less, and a deliberate mistake is none of these. */
+    text = printed(json_pack("[ooo]", claim_of("EQUIVALENT", "EQUIVALENT", 0.00151, 0, 0, 3),
+                             claim_of("EQUIVALENT", "EQUIVALENT", 0.00149, 0, 0, 3),
+                             claim_of("DIFFERENT", "DIFFERENT", 1, 0, 0, 3)));
+    assert_non_null(strstr(text,
+                           "\nnote:   mine is 0.15 % too bright on 12_point_plane (against truth), "
+                           "which is not noise, but within its 0.2 %\nlook: "));
+    free(text);
     /* Worst first: what is the opposite of what was expected before what is undecided. */
     text = printed(json_pack("[oo]", claim_of("INCONCLUSIVE", "EQUIVALENT", 0, 0, 0, 3),
                              claim_of("DIFFERENT", "EQUIVALENT", 0.0101, 0, 0, 3)));
