@@ -171,10 +171,10 @@ cp -R "$tmp/tree" "$tmp/made" && make -sC "$tmp/made" && mkdir "$tmp/built" && c
 expect "programs" 0 "4.00 of 6" grade programs "$tmp/cmake.rubric" "$tmp/built" "$tmp/prebuilt.zip"
 for name in built prebuilt; do points programs $name 4.0; done
 # As a web form stores them: without their mode, as Windows ends lines, an archive without the ending of its name.
-mkdir "$tmp/modes" "$tmp/modes/windows" && cp -R "$tmp/built" "$tmp/modes/lost" && chmod a-x "$tmp/modes/lost/tiny"
-printf '#!/bin/sh\r\n./x\r\n' >"$tmp/modes/windows/tiny" && cp "$tmp/zipped.zip" "$tmp/modes/bare"
-cp "$tmp/made/tiny" "$tmp/modes/alone" && chmod a-x "$tmp/modes/alone"
-expect "programs that were not executable" 2 "4.00 of 6" grade modes "$tmp/cmake.rubric" "$tmp/modes"/*
+mkdir "$tmp/unmarked" "$tmp/unmarked/windows" && cp -R "$tmp/built" "$tmp/unmarked/lost" && chmod a-x "$tmp/unmarked/lost/tiny"
+printf '#!/bin/sh\r\n./x\r\n' >"$tmp/unmarked/windows/tiny" && cp "$tmp/zipped.zip" "$tmp/unmarked/bare"
+cp "$tmp/made/tiny" "$tmp/unmarked/alone" && chmod a-x "$tmp/unmarked/alone"
+expect "programs that were not executable" 2 "4.00 of 6" grade modes "$tmp/cmake.rubric" "$tmp/unmarked"/*
 points modes lost 4.0
 said modes alone not_started 'It does not start: the shared library liblevel.so is missing'
 said modes windows not_started 'It does not start: the first line of tiny ends as on Windows'
