@@ -620,6 +620,12 @@ said() { for pattern; do grep -q "$pattern" "$tmp/out" || echo "no line with $pa
 expect "converge: another renderer beside ours" 0 "^student *variance / pathtracer's at 16 spp" \
     $converge --engine student --engine pathtracer -o "$tmp/conv9" 13_square_patch
 tell "converge: which is judged" "$(said "^student *slope of RMSE .*EQUIVALENT" "^student *RMS bias .*EQUIVALENT")"
+expect "converge: a renderer that is noisier than another" 1 "^student: at 16 samples its variance is .* times that of pathtracer-sobol .*, margin 100 %" \
+    $converge --engine student --engine pathtracer-sobol --margin-variance 1 -o "$tmp/conv9" 13_square_patch
+tell "converge: which the row says, too" "$(said "^student *variance / pathtracer-sobol's at 16 spp .*DIFFERENT" "^student *variance / pathtracer-sobol's at 1 spp .*MEASURED")"
+expect "converge: one that is less noisy" 0 "^pathtracer-sobol *variance / student's at 16 spp .*EQUIVALENT" \
+    $converge --engine pathtracer-sobol --engine student --margin-variance 1 -o "$tmp/conv9" 13_square_patch
+expect "converge: of the noise of one alone nothing can be said" 3 "margin-variance is of the first --engine over others" $converge --engine student --margin-variance 1 13_square_patch
 engine "$command" '"diffuse", "area"'
 fake 'exec student_tracer "$@" 1.2'
 expect "converge: another renderer with a bias" 1 "^fake: .*RMS bias is above 5 %" \

@@ -141,6 +141,10 @@ static const struct cli_option options[] = {
      TO(o.alpha), 1e-12, 0.4},
     {0, "margin", "M", "largest RMS over pixels of the relative bias that passes (0.01)",
      TO(o.margin), 1e-6, 1},
+    {0, "margin-variance", "M",
+     "the first --engine may have 1 + M times the variance of each other\n"
+     "one, at the last rung; more is DIFFERENT (measured, not judged)",
+     TO(o.margin_variance), 1e-6, 1000},
     {0, "slope-margin", "M",
      "INCONCLUSIVE if the confidence interval of a slope contains -1/2 but\n"
      "is wider than +-M or, of a described renderer, ends above -1/2 + M\n"
@@ -204,6 +208,9 @@ static bool read_command(struct converge_command *c, int argc, char **argv, stru
     if (o->golden_dir == NULL)
         o->golden_dir = c->at.golden.s;
     o->described = c->described;
+    if (o->margin_variance > 0 && (c->num_engines < 2 || engine_with_goldens(c->engine[0]) != NULL))
+        return err_set(e, "--margin-variance is of the first --engine over others: give yours, "
+                          "then these");
     bool ok = (!suite_own_is(o->suite_dir) || suite_load(o->suite_dir, &suite, e)) &&
               find_engines(c, &suite, e);
     suite_free(&suite);

@@ -26,6 +26,7 @@ struct converge_options {
     uint32_t seed;
     double alpha;        /* of all judgements of the run together */
     double margin;       /* largest RMS bias that counts as none, relative */
+    double margin_variance; /* of the first engine over each other; 0: measured, not judged */
     double slope_margin; /* INCONCLUSIVE: -1/2 is in the interval, but that is wider than +- this */
     int threads;
     double timeout_s;

@@ -130,7 +130,7 @@ void report_convergence_headline(FILE *f, const json_t *results, bool alone)
         fprintf(f, "Convergence: %zu of %zu engines could not be judged, %zu failed.", errors, num,
                 wrong);
     else if (wrong > 0)
-        fprintf(f, "Convergence: %zu of %zu judged engines did not converge as they must.", wrong,
+        fprintf(f, "Convergence: %zu of %zu judged engines are not as they must be.", wrong,
                 judged);
     else if (undecided > 0)
         fprintf(f,

@@ -20,8 +20,9 @@ static const struct shape measured_shape = {
     .part = {{"rungs", &rung_shape, PART_LIST_OF_2}}};
 static const struct shape ratio_rung_shape = {
     .names = {[IS_POSITIVE] = "spp", [IS_POSITIVE_ESTIMATE] = "variance efficiency~"}};
-static const struct shape ratio_shape = {.names = {[IS_TEXT] = "a b"},
-                                         .part = {{"rungs", &ratio_rung_shape, PART_LIST_OF_2}}};
+static const struct shape ratio_shape = {
+    .names = {[IS_TEXT] = "a b", [IS_VERDICT] = "variance_verdict?"},
+    .part = {{"rungs", &ratio_rung_shape, PART_LIST_OF_2}}};
 static const struct shape scene_shape = {
     .names = {[IS_TEXT] = "scene reference",
               [IS_NUMBER] =
@@ -135,22 +136,24 @@ static void engine_rows(const struct sink *s, const json_t *scene, const json_t 
 }
 
 static void ratio_row(const struct sink *s, const char *scene, const json_t *ratio, size_t rung,
-                      const char *name, const char *interval)
+                      const char *name, const char *interval, const char *verdict)
 {
     const json_t *g = json_array_get(json_object_get(ratio, "rungs"), rung);
     char quantity[128], text[160];
     snprintf(quantity, sizeof quantity, "%s / %s's at %g spp", name, member_text(ratio, "b"),
              member_number(g, "spp"));
     format_value(text, sizeof text, g, name, interval);
-    emit(s, scene, member_text(ratio, "a"), quantity, text, json_shape_measured);
+    emit(s, scene, member_text(ratio, "a"), quantity, text,
+         verdict != NULL ? verdict : json_shape_measured);
 }
 
 static void ratio_rows(const struct sink *s, const char *scene, const json_t *ratio)
 {
     size_t last = json_array_size(json_object_get(ratio, "rungs")) - 1;
-    ratio_row(s, scene, ratio, 0, "variance", "variance_ci");
-    ratio_row(s, scene, ratio, last, "variance", "variance_ci");
-    ratio_row(s, scene, ratio, last, "efficiency", "efficiency_ci");
+    ratio_row(s, scene, ratio, 0, "variance", "variance_ci", NULL);
+    ratio_row(s, scene, ratio, last, "variance", "variance_ci",
+              member_text(ratio, "variance_verdict"));
+    ratio_row(s, scene, ratio, last, "efficiency", "efficiency_ci", NULL);
 }
 
 void convergence_results_rows(const json_t *scene,
