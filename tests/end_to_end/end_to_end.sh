@@ -591,6 +591,8 @@ bad_engine "writes another size" "3 x 1 pixels, not 64 x 64" \
     'printf "PF\n3 1\n-1.0\n123456789012123456789012123456789012" >$4'
 bad_engine "writes NaN" "is not finite" "($pfm head -c 49152 /dev/zero | tr '\\0' '\\377') >\$4"
 bad_engine "ignores its seed" "the seed has no effect" "($pfm yes abcdefg | head -c 49152) >\$4"
+bad_engine "makes one of two images" "replicate 2 is the same image as an earlier one: the program has few different images" \
+    "n=\$(cat '$tmp/calls' 2>/dev/null || echo 0); echo \$((n + 1)) >'$tmp/calls'; ($pfm yes abcdef\$((n % 2)) | head -c 49152) >\$4"
 sed -i 's/"pfm"/"hdr"/' "$tmp/fake.json"
 bad_engine "has less noise than RGBE shows" "or less than RGBE's 8 bits show" \
     "(printf '#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 64 +X 64\n'; yes abcdefg | head -c 16384) >\$4"
