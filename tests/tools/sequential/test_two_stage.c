@@ -111,8 +111,8 @@ TEST(test_same_place)
 
 /* H0: equal laws. alpha 4 %, so 20 % in each stage. 1000 worlds: DIFFERENT in at most 4 %; more than 66
  * have a probability of 4e-5 at that rate. Negative control: a second stage on the first pair again
- * confirms what it saw, nearly always, as its level is divided among the flagged places alone. It means
- * something only if the worlds flagged by the first stage are more than 66. */
+ * confirms what it saw, in more than 8 of 10, as its level is divided among the flagged places alone; a fresh
+ * pair in at most 1 of 5. */
 TEST(test_false_alarms)
 {
     struct world w = new_world();
@@ -131,7 +131,7 @@ TEST(test_false_alarms)
     print_message("of 1000 equal: %d flagged, %d DIFFERENT; %d if the first pair is used twice\n",
                   num_flagged, different, again);
     assert_true(different <= 66);
-    assert_true(again > 66);
+    assert_true(num_flagged > 40 && again > 0.8 * num_flagged);
     free_world(&w);
 }
 

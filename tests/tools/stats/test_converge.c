@@ -353,7 +353,7 @@ TEST(a_vague_slope_is_inconclusive)
 }
 
 /* H0: a bias of exactly the margin, 3 %, where DIFFERENT and EQUIVALENT are both wrong: each in at most
- * alpha = 5 % of 2000 runs a law (10 % with shared noise). Controls: without bias never DIFFERENT and
+ * alpha = 5 % of 2000 runs a law (10 % with shared noise). Controls: without bias DIFFERENT in less than 1 % and
  * EQUIVALENT in more than 90 %; with 9 % always DIFFERENT. */
 TEST(floor_keeps_its_error_rates)
 {
@@ -362,7 +362,7 @@ TEST(floor_keeps_its_error_rates)
     static const double scale[] = {1, 0.2294157, 1.4142136};
     for (int law = EXPONENTIAL; law <= SHARED; law++) {
         RNG *rng = new_rng(300 + (unsigned long)law);
-        int above = 0, below = 0, good = 0, found = 0;
+        int above = 0, below = 0, good = 0, bad = 0, found = 0;
         for (int run = 0; run < RUNS; run++) {
             static float images[K * SIZE];
             static const double bias[3] = {0.03, 0, 0.09};
@@ -380,16 +380,16 @@ TEST(floor_keeps_its_error_rates)
             below += v[0] == VERDICT_EQUIVALENT;
             good += v[1] == VERDICT_EQUIVALENT;
             found += v[2] == VERDICT_DIFFERENT;
-            assert_int_not_equal(v[1], VERDICT_DIFFERENT);
+            bad += v[1] == VERDICT_DIFFERENT;
         }
-        printf("floor, law %d: no bias EQUIVALENT %d, 9 %% DIFFERENT %d of %d\n", law, good, found,
-               RUNS);
+        printf("floor, law %d: no bias EQUIVALENT %d, DIFFERENT %d, 9 %% DIFFERENT %d of %d\n", law,
+               good, bad, found, RUNS);
         /* Shared noise: the same limit as of the slope. */
         double alpha = law == SHARED ? 0.1 : 0.05;
         assert_rate("bias at the margin called DIFFERENT", above, RUNS, alpha);
         assert_rate("bias at the margin called EQUIVALENT", below, RUNS, alpha);
         assert_int_equal(found, RUNS);
-        assert_true(good > 0.9 * RUNS);
+        assert_true(good > 0.9 * RUNS && bad < 0.01 * RUNS);
     }
 }
 
