@@ -55,14 +55,15 @@ static bool load_reference(const struct run *r, const struct suite_scene *s,
     int shrink = o->shrink;
     if (ref == NULL && !choose && !own)
         return err_set(e, "%s has no reference '%s'", from->name, o->against);
-    if (ref == NULL || (!reference_is_rendered(ref) && strcmp(ref->engine, "truth") != 0)) {
+    const bool truth = ref != NULL && strcmp(ref->engine, "truth") == 0,
+               stored = ref != NULL && reference_is_rendered(ref);
+    if (!truth && !stored) {
         shrink = 1;
         int spp = OWN_FACTOR * o->ladder[o->num_rungs - 1];
         snprintf(name, 64, "pathtracer, %d samples", spp);
         if (!converge_render_own(job, spp, &m, e))
             return false;
     } else {
-        const bool truth = strcmp(ref->engine, "truth") == 0;
         snprintf(name, 64, truth ? "closed form" : "golden of %s", ref->engine);
         json_t *manifest = NULL;
         bool ok = truth ? truth_render(s, ref, &m, e)

@@ -8,7 +8,7 @@
  * of dir's path, @BIN@ the directory of this program, both quoted for a shell. Fails before it writes anything if one
  * of the files exists; after another failure what was written is removed. */
 NODISCARD bool starter_write(const char *dir, const char *share_dir, struct err *e);
-/* Removes what starter_write() wrote, and nothing else. */
+/* Removes the files that starter_write() wrote, and dir and dir/scenes if they are empty then. */
 void starter_remove(const char *dir);
 
 #endif
