@@ -131,6 +131,19 @@ static void make_single(struct moments *m, const char *unit, double n)
         m->n[p] = n;
 }
 
+/* Fails if it is to be another. */
+static bool add_hash(struct engine_job *j, const char *sha256, struct err *e)
+{
+    const json_t *same = j->opt->same_as;
+    const size_t k = json_array_size(j->images);
+    const char *has = json_string_value(json_array_get(same, k));
+    json_array_append_new(j->images, json_string(sha256));
+    if (same == NULL || (has != NULL && strcmp(has, sha256) == 0))
+        return true;
+    *j->opt->differs = true;
+    return err_set(e, "image %zu is another one", k);
+}
+
 /* Runs, reads and folds. */
 static bool fold_runs(struct engine_job *j, struct moments *m, struct err *e)
 {
@@ -147,7 +160,9 @@ static bool fold_runs(struct engine_job *j, struct moments *m, struct err *e)
         if (!ok)
             break;
         replicate_repeats_add(&repeats, px, pixels);
-        if (j->en->output == OUTPUT_MEAN && repeats.same >= 0 && !repeats.without_noise)
+        if (j->en->output == OUTPUT_MEAN)
+            ok = add_hash(j, repeats.sha256[k], e);
+        if (ok && j->en->output == OUTPUT_MEAN && repeats.same >= 0 && !repeats.without_noise)
             ok = err_set(e, "replicate %d is the same image as an earlier one: %s%s", repeats.same,
                          repeats.same > 1
                              ? "the program has few different images, as if {seed} did not "
@@ -237,13 +252,17 @@ bool engine_render(const struct engine *en, const struct suite_scene *scene,
         return err_set(e, "%s: cannot make a directory in it: %s", work, strerror(errno));
     *manifest = NULL;
     j.independence = json_object();
+    j.images = json_array();
     bool rendered = engine_program(en, "command", j.program, sizeof j.program, e) &&
                     engine_write_scene(en, scene, dir.s, j.scene, e) && run_all(&j, out, e);
     bool ok = rendered && engine_describe(&j, out, progress_seconds() - start, manifest, e) &&
               fs_remove_tree(dir.s, e);
     json_decref(j.independence);
+    json_decref(j.images);
     if (ok)
         return true;
+    if (opt->same_as != NULL && *opt->differs && fs_remove_tree(dir.s, e))
+        return false;
     if (rendered)
         moments_free(out);
     json_decref(*manifest);

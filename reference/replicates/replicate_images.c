@@ -1,10 +1,10 @@
 #include "replicate_images.h"
 
+#include "renderer/base/sha256.h"
 #include "renderer/image/image_oiio.h"
 
 #include <assert.h>
 #include <math.h>
-#include <nettle/sha2.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -83,8 +83,8 @@ bool replicate_images_write(const char *path, int width, int height, const float
 bool replicate_repeats_alloc(struct replicate_repeats *r, int capacity, struct err *e)
 {
     *r = (struct replicate_repeats){.capacity = capacity, .same = -1, .without_noise = true};
-    r->digest = malloc((size_t)capacity * sizeof *r->digest);
-    return r->digest != NULL || err_set(e, "hashes of images: out of memory");
+    r->sha256 = malloc((size_t)capacity * sizeof *r->sha256);
+    return r->sha256 != NULL || err_set(e, "hashes of images: out of memory");
 }
 
 static bool is_constant(const float *pixels_rgb, size_t pixels)
@@ -97,14 +97,10 @@ static bool is_constant(const float *pixels_rgb, size_t pixels)
 
 int replicate_repeats_add(struct replicate_repeats *r, const float *pixels_rgb, size_t pixels)
 {
-    struct sha256_ctx ctx;
     int k = 0;
     assert(r->num < r->capacity);
-    static_assert(sizeof *r->digest == SHA256_DIGEST_SIZE, "a digest");
-    sha256_init(&ctx);
-    sha256_update(&ctx, 3 * pixels * sizeof *pixels_rgb, (const uint8_t *)pixels_rgb);
-    sha256_digest(&ctx, SHA256_DIGEST_SIZE, r->digest[r->num]);
-    while (memcmp(r->digest[k], r->digest[r->num], sizeof *r->digest) != 0)
+    sha256_bytes(pixels_rgb, 3 * pixels * sizeof *pixels_rgb, r->sha256[r->num]);
+    while (memcmp(r->sha256[k], r->sha256[r->num], sizeof *r->sha256) != 0)
         k++;
     if (k < r->num && r->same < 0)
         r->same = r->num;
@@ -115,6 +111,6 @@ int replicate_repeats_add(struct replicate_repeats *r, const float *pixels_rgb, 
 
 void replicate_repeats_free(struct replicate_repeats *r)
 {
-    free(r->digest);
+    free(r->sha256);
     *r = (struct replicate_repeats){0};
 }

@@ -40,7 +40,7 @@ struct replicate_repeats {
     int num, capacity;
     int same;           /* the first that repeats an earlier one; -1: none */
     bool without_noise; /* all pixels of all so far agree */
-    uint8_t (*digest)[32];
+    char (*sha256)[65]; /* of each */
 };
 NODISCARD bool replicate_repeats_alloc(struct replicate_repeats *r, int capacity, struct err *e);
 /* Adds an image; returns the number of the first equal one, its own if there is none. */

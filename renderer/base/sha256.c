@@ -38,10 +38,15 @@ bool sha256_file(const char *path, char hex[65], struct err *e)
     return true;
 }
 
-void sha256_text(const char *text, char hex[65])
+void sha256_bytes(const void *bytes, size_t num, char hex[65])
 {
     struct sha256_ctx ctx;
     sha256_init(&ctx);
-    sha256_update(&ctx, strlen(text), (const uint8_t *)text);
+    sha256_update(&ctx, num, bytes);
     finish(&ctx, hex);
+}
+
+void sha256_text(const char *text, char hex[65])
+{
+    sha256_bytes(text, strlen(text), hex);
 }

@@ -72,6 +72,27 @@ expect "convergence of the suite's engine" 0 "^mine *slope of RMSE .*EQUIVALENT"
 expect "which is not for ours" 3 "begun/mine.json is for a suite of its own" assay converge --suite "$top/reference/scenes" --engine begun/mine.json 13_square_patch
 mkdir elsewhere
 expect "in another folder, too" 0 "result: all as it should be, 1 the same" env -C elsewhere bash -c "$again"
+# Same bits need no statistics; the run with other seeds is the control: there the same program is judged by them.
+tell "the bits of a program that did not change are the same" "$(grep -q '"same_bits": true' report/results.json && grep -q '"reason": "the same bits as all 64 images of the reference, seed by seed"' report/results.json || echo "not said")"
+expect "with other seeds it is judged by statistics" 0 "all as it should be, 1 the same within their margins" assay validate -q --suite begun --reference-seed 5 --out report
+tell "which say nothing of bits" "$(grep same_bits report/results.json)"
+cp -r begun bits
+printf '#!/bin/sh\necho "$6" >>"$(dirname "$0")/called"\nexec once "$7" pathtracer -q -r "$2" "$3" -s "$4" -m "$5" --seed "$6" -f "$7" "$1"\n' >bits/mine.sh
+sed -i 's/"margin"/"margin_variance": 0.01, &/' bits/suite.json
+expect "so is its noise, whatever the margin" 0 "all as it should be, 1 the same to the bit" env -C bits assay validate -q
+tell "at no more images than the engine makes" "$(wc -l <bits/called | grep -vx 64)"
+sed -i 's/"replicates": 64/"replicates": 8/' bits/mine.json && rm bits/called
+expect "fewer images are held against as many" 0 "1 the same to the bit" env -C bits assay validate -q
+tell "and no more rendered" "$(wc -l <bits/called | grep -vx 8; grep -q 'the same bits as the first 8 of 64 images' bits/build/report/results.json || echo "not said")"
+# From the third image on a program without indirect light.
+sed -i 's/"replicates": 8/"replicates": 64/' bits/mine.json && rm bits/called
+sed -i 's/"margin_variance": 0.01, //' bits/suite.json
+sed -i 's/^exec.*/[ "$(wc -l <"$(dirname "$0")\/called")" -lt 3 ] || set -- "$1" "$2" "$3" "$4" 1 "$6" "$7"\n&/' bits/mine.sh
+expect "a program with other bits is judged by statistics" 1 "mine is [0-9.]* % too dark" env -C bits assay validate -q
+tell "with seeds of its own after the first that differs" "$(wc -l <bits/called | grep -vx $((3 + 64)); grep -q '"same_bits": false' bits/build/report/results.json || echo "not said")"
+printf '#!/bin/sh\necho "$6" >>"$(dirname "$0")/called"\necho "assertion failed"\nexit 7\n' >bits/mine.sh && rm bits/called
+expect "a program that crashes" 3 "cornell, mine: .*exit status 7: assertion failed" env -C bits assay validate -q
+tell "is called once" "$(wc -l <bits/called | grep -vx 1)"
 expect "validate in the folder itself" 0 "result: all as it should be, 1 the same" env -C begun assay validate -q --out "$tmp/free/report"
 again=$(python3 -c "import json; print(json.load(open('report/results.json'))['claims'][0]['rerun'])")
 expect "whose commands run in another folder, too" 0 "result: all as it should be, 1 the same" env -C elsewhere bash -c "$again"
@@ -120,7 +141,7 @@ sed -i 's/"comment": "/&and /' mine.json
 assay golden render --engine mine.json --as mine-1.0 --only cornell >/dev/null 2>&1
 expect "and approved, without what is no longer new" 0 "^1 approved, 0 unchanged" assay golden approve --new
 expect "--all is for that, too" 0 "approved, in place of what was stored" assay golden approve --all
-expect "all of these are as expected" 0 "all as it should be, 3 the same within their margins, 1 deliberate mistake" assay validate -q
+expect "all of these are as expected" 0 "all as it should be, 3 the same within their margins (1 of them to the bit), 1 deliberate mistake" assay validate -q
 expect "an engine that is no reference" 3 "dae: is it one of .*mine-1.0.*give --as NAME" assay golden render --engine dae.json
 expect "what an engine cannot express is said" 0 "dae cannot express cornell: the description does not list: area" assay golden render --engine dae.json --as mine-1.0
 expect "--live is for our scenes" 3 "references of ./suite.json are stored" assay validate -q --live
@@ -179,7 +200,7 @@ expect "without one, more noise passes" 0 "all as it should be, 1 the same" env 
 sed -i 's/"margin"/"margin_variance": 0.2, &/' noisier/suite.json
 expect "with one it does not" 1 "mine is more noisy, 1.[23][0-9]* times the variance on cornell" env -C noisier assay validate -q
 cp begun/mine.sh noisier
-expect "and what is as noisy as before passes" 0 "all as it should be, 1 the same" env -C noisier assay validate -q
+expect "and what is as noisy as before passes" 0 "all as it should be, 1 the same within their margins" env -C noisier assay validate -q --reference-seed 0
 
 # A version: the page of many runs names it.
 cp -r begun versioned
@@ -226,7 +247,7 @@ guide | sed '/^cd \.\.$/,$d' >first.sh
 guide | sed -n '/^cd \.\.$/,$p' | sed 1d >second.sh
 bash -c 'trap '\''s=$?; echo "status $s: $BASH_COMMAND"; [ $s -le 1 ] || exit'\'' ERR; . ./first.sh' >first.out 2>&1 </dev/null
 tell "the guide: green, red, green" "$(grep -oE '^result: (all as it should be, [0-9]+|2 of 2 not as it should be: mine is [0-9.]+ % too dark)|^status .*' first.out | sed 's/[0-9.]* % too dark/dark/' |
-    diff - <(printf '%s\n' 'result: all as it should be, 1' 'result: all as it should be, 2' 'result: 2 of 2 not as it should be: mine is dark' \
+    diff - <(printf '%s\n' 'result: all as it should be, 1' 'result: all as it should be, 2' 'result: all as it should be, 2' 'result: 2 of 2 not as it should be: mine is dark' \
         'status 1: assay validate' 'result: all as it should be, 2') || tail -n 5 first.out)"
 tell "CI has the line where it is wrong" "$(grep -q '^::error title=ball.*DIFFERENT, expected EQUIVALENT' first.out || grep '^::' first.out)"
 tell "control: no other line of the guide fails" "$(grep -c '^status' first.out | grep -vx 1)"

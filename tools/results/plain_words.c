@@ -160,6 +160,8 @@ struct plain_words plain_words_claim(const json_t *claim)
     else if (strcmp(verdict, "DIFFERENT") == 0)
         snprintf(w.s, sizeof w.s, "%.100s is %.200s%.110s (against %.100s)", a, too_bright(claim).s,
                  scene.s, b);
+    else if (json_is_true(json_object_get(claim, "same_bits")))
+        snprintf(w.s, sizeof w.s, "%.100s makes the same bits%.110s (as %.100s)", a, scene.s, b);
     else if (strcmp(verdict, "EQUIVALENT") == 0)
         snprintf(w.s, sizeof w.s, "%.100s is the same%.110s (as %.100s), within %.3g %%%s", a,
                  scene.s, b, 100 * member_number(claim, "margin_global"),
@@ -284,6 +286,20 @@ static void print_inside(FILE *f, const json_t *claims)
         fprintf(f, "; and %zu more", num - 1);
 }
 
+/* num: the claims that found no difference, as they should. */
+static void print_the_same(FILE *f, const json_t *claims, size_t num)
+{
+    size_t bits = 0;
+    json_each(claim, claims)
+        bits += json_is_true(json_object_get(claim, "same_bits"));
+    if (bits == num)
+        fprintf(f, ", %zu the same to the bit", num);
+    else
+        fprintf(f, ", %zu the same within their margins", num);
+    if (bits > 0 && bits < num)
+        fprintf(f, " (%zu of them to the bit)", bits);
+}
+
 void plain_words_print(FILE *f, const json_t *results, const char *page)
 {
     const json_t *claims = json_object_get(results, "claims"),
@@ -312,7 +328,7 @@ void plain_words_print(FILE *f, const json_t *results, const char *page)
     if (bad == 0) {
         fputs("\nresult: all as it should be", f);
         if (num > mistakes)
-            fprintf(f, ", %zu the same within their margins", num - mistakes);
+            print_the_same(f, claims, num - mistakes);
         if (mistakes > 0)
             fprintf(f, ", %zu deliberate mistake%s found", mistakes, mistakes == 1 ? "" : "s");
     } else {

@@ -122,14 +122,15 @@ double side_cost(const struct side *s, int look)
     return n * samples * s->scene->width * s->scene->height;
 }
 
-/* The path without ending, in out_dir: data/SCENE/NAME[_filter][_fresh][_OBSERVATIONS]. */
+/* The path without ending, in out_dir: data/SCENE/NAME[_filter][_as_REFERENCE][_fresh][_OBSERVATIONS]. */
 static struct path stem_of(const struct validation *v, const struct side *s, int stage, int look)
 {
     char n[16] = "";
     if (v->sequence != &alpha_spending_single && side_grows(s))
         snprintf(n, sizeof n, "_%d", side_count(s, look));
     bool filtered = s->scene->filter.radius > 0 && s->kind != SIDE_ENGINE;
-    return fs_path("data/%s/%s%s%s%s", s->scene->name, s->name, filtered ? "_filter" : "",
+    return fs_path("data/%s/%s%s%s%s%s%s", s->scene->name, s->name, filtered ? "_filter" : "",
+                   s->of != NULL ? "_as_" : "", s->of != NULL ? s->of : "",
                    stage > 0 && s->kind != SIDE_TRUTH ? "_fresh" : "", n);
 }
 
@@ -183,16 +184,19 @@ static bool render_live(const struct validation *v, const struct side *s, int st
     return reference_render(s->scene, &ref, &ro, &out->m, &out->manifest, e);
 }
 
-static bool render_engine(const struct validation *v, const struct side *s, int stage,
+static bool render_engine(const struct validation *v, struct side *s, int stage,
                           struct side_image *out, struct err *e)
 {
     const struct validate_options *o = v->opt;
+    const uint32_t seed = s->of != NULL ? s->seed : o->reference_seed;
     const struct engine_options eo = {.spp = o->engine_spp,
                                       .replicates = o->engine_replicates,
-                                      .seed = stage > 0 ? ~o->reference_seed : o->reference_seed,
+                                      .seed = stage > 0 ? ~seed : seed,
                                       .threads = o->threads,
                                       .timeout_s = program_time(v),
-                                      .work_dir = o->out_dir};
+                                      .work_dir = o->out_dir,
+                                      .same_as = s->same_as,
+                                      .differs = &s->differs};
     const struct path path =
         full_path(v, fs_path("%s.json", stem_of(v, s, stage, LOOK_DECLARED).s).s);
     if (!engine_render(o->engine, s->scene, &eo, &out->m, &out->manifest, e))
@@ -361,8 +365,11 @@ enum fetch_result side_at(struct validation *v, struct side *s, int stage, int l
         return FETCH_NO_TIME;
     if (s->kind != SIDE_TRUTH && s->kind != SIDE_GOLDEN) {
         char note[160];
-        snprintf(note, sizeof note, "rendering with %s%s", s->name,
-                 stage > 0 ? ", fresh seeds" : "");
+        snprintf(note, sizeof note, "rendering with %s%s%s", s->name,
+                 stage > 0       ? ", fresh seeds"
+                 : s->of != NULL ? ", seeds of "
+                                 : "",
+                 stage == 0 && s->of != NULL ? s->of : "");
         validate_log(v, s->scene->name, note);
     }
     double begun = progress_seconds();

@@ -44,7 +44,7 @@ static char *rerun_command(const struct validation *v, const struct claim_run *t
                           "--seed", json_sprintf("%llu", (unsigned long long)o->seed));
     if (o->live)
         add_option(w, "--live", NULL);
-    if (o->live || o->engine != NULL)
+    if (o->live || (o->engine != NULL && !t->is_repeated))
         add_option(w, "--reference-seed", json_sprintf("%u", o->reference_seed));
     if (o->engine != NULL)
         add_option(w, "--engine", json_string(o->engine->file));
@@ -125,6 +125,8 @@ static void add_provenance(json_t *claim, const struct validation *v, const stru
         json_object_set_new(claim, "version_a", json_string(version_a));
     json_t *version = json_object_get(b->manifest, "version");
     json_t *seeds = json_object_get(b->manifest, "seeds");
+    if (t->is_repeated || t->again.differs)
+        json_object_set_new(claim, "same_bits", json_boolean(t->is_repeated));
     if (version != NULL)
         json_object_set(claim, "version_b", version);
     if (seeds != NULL)
@@ -310,16 +312,21 @@ static void look(struct validation *v, struct claim_run *t)
     struct compare_options opt = options_of(t, v->alpha);
     struct comparison c;
     struct err e = {""};
-    int stage;
+    int stage = 0;
     double before_a = t->a->cpu_s, before_b = t->b->cpu_s;
-    bool ok = alpha_spending_judge(t->looks, t->next, t->stages, &opt, both_of, &p, &c, &stage, &e);
-    if (ok && !hint_add(p.is_estimated ? &p.estimated[0] : &p.image[0]->m,
-                        p.is_estimated ? &p.estimated[1] : &p.image[1]->m, 1, &c, &e)) {
+    struct side *const first = t->a;
+    t->is_repeated = t->seen[0] == NULL && repeated_seeds_render(v, t, p.image);
+    bool ok = t->is_repeated ? repeated_seeds_judge(p.image, &opt, &c, &e)
+                             : alpha_spending_judge(t->looks, t->next, t->stages, &opt, both_of, &p,
+                                                    &c, &stage, &e);
+    if (ok && !t->is_repeated &&
+        !hint_add(p.is_estimated ? &p.estimated[0] : &p.image[0]->m,
+                  p.is_estimated ? &p.estimated[1] : &p.image[1]->m, 1, &c, &e)) {
         comparison_free(&c);
         ok = false;
     }
     pair_free(&p);
-    t->cpu_a += t->a->cpu_s - before_a;
+    t->cpu_a += t->a->cpu_s - (t->a == first ? before_a : 0);
     t->cpu_b += t->b->cpu_s - before_b;
     if (!ok && p.no_time) {
         t->stalled = true;

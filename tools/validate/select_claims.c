@@ -339,6 +339,7 @@ bool select_claims(struct validation *v, json_t *cannot, struct err *e)
 void claim_run_free(struct claim_run *t)
 {
     comparison_free(&t->c);
+    side_free(&t->again);
     json_decref(t->history);
     json_decref(t->result);
 }

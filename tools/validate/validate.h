@@ -25,6 +25,9 @@ struct validate_options {
     uint32_t reference_seed;     /* live: of the references */
     const struct engine *engine; /* a further engine, judged against references and ours, or NULL */
     int engine_spp, engine_replicates; /* 0: as its description says */
+    bool
+        repeats_seeds; /* the engine is rendered with the seeds of each stored reference first, and is EQUIVALENT
+                           to it if that makes the same bits; where not, with reference_seed */
     int threads;
     double timeout_s; /* of one program */
     bool quiet;

@@ -56,7 +56,9 @@ static const struct cli_option options[] = {
     {0, "engine-replicates", "K", "number of replicates of --engine (as in its file)",
      TO(opt.engine_replicates), 3, 4096},
     {0, "seed", "N", "seed of the renders by --pathtracer (1)", TO(opt.seed)},
-    {0, "reference-seed", "N", "with --live: seed of the references (random); else of --engine (0)",
+    {0, "reference-seed", "N",
+     "with --live: seed of the references (random); else of --engine (0,\n"
+     "in a suite of your own after the seeds of its references)",
      .read = read_reference_seed},
     {'t', "threads", "N", "number of threads; 0: one per processor (0)", TO(opt.threads), 0, 1024},
     {0, "timeout", "S", "time limit for each program run, seconds (3600)", TO(opt.timeout_s), 1,
@@ -229,6 +231,7 @@ bool validate_command_read(int argc, char **argv, struct validate_command *c, st
         c->opt.golden_dir = c->at.golden.s;
     if (suite_own_is(c->opt.suite_dir) && !ask_own_suite(c, e))
         return false;
+    c->opt.repeats_seeds = suite_own_is(c->opt.suite_dir) && !c->has_reference_seed;
     uint32_t *seed = &c->opt.reference_seed;
     if (c->opt.live && !c->has_reference_seed &&
         getrandom(seed, sizeof *seed, 0) != (ssize_t)sizeof *seed)

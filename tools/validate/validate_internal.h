@@ -42,6 +42,12 @@ struct side {
     const struct suite_variant *variant; /* SIDE_OURS; NULL: pathtracer itself */
     const struct suite_reference *ref;   /* SIDE_TRUTH to SIDE_LIVE */
     int users;                           /* claims that may want another look */
+    /* SIDE_ENGINE: NULL, or the reference with whose seed it is rendered as long as its images are the same; differs: they
+     * were not, so that it failed. */
+    const char *of;
+    uint32_t seed;
+    const json_t *same_as;
+    bool differs;
     struct side_image at[NUM_STAGES][NUM_LOOKS];
     double wall_s, units; /* rendered in this run: wall seconds and observations */
     double cpu_s;
@@ -62,6 +68,8 @@ struct claim_run {
     const struct suite_scene *scene;
     struct side *a, *b; /* NULL: the claim of consistency, or of noise */
     bool of_noise;
+    struct side again; /* a, if the engine makes the same bits as b with its seeds */
+    bool is_repeated;
     struct suite_reference ref; /* b's name and class; the claim's margins */
     enum verdict expected;
     const struct alpha_spending *looks;
@@ -127,6 +135,14 @@ void side_add_places(const struct validation *v, bool of_goldens, json_t *words)
 NODISCARD bool side_renewal(const struct validation *v, const struct side *s,
                             const json_t *manifest, json_t **out);
 void side_free(struct side *s);
+
+/* repeated_seeds.c: does the claim's engine make the same bits as the stored reference, with its seeds? Then t->a is the
+ * engine of these seeds, whose image is image[0]; image[1] is b's. */
+bool repeated_seeds_render(struct validation *v, struct claim_run *t, struct side_image *image[2]);
+/* The comparison of two such images, without any noise. Fails as compare_moments(). */
+NODISCARD bool repeated_seeds_judge(struct side_image *const image[2],
+                                    const struct compare_options *opt, struct comparison *out,
+                                    struct err *e);
 
 /* Does --only select any claim of a scene? All of them? */
 bool scene_is_selected(const struct validate_options *o, const char *name);
