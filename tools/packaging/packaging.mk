@@ -10,7 +10,7 @@ LIBRARY_ABI     := 1
 LIBRARY_SOURCES := $(wildcard $(addsuffix /*.c,$(addprefix renderer/,base math image) reference/base reference/suite \
   $(addprefix tools/,images stats compare exact input sequential results html plots report library)) \
   $(addprefix reference/replicates/,independence.c replicates.c shared_noise.c) $(addprefix tools/base/,temp_dir.c text.c text_table.c) \
-  tools/validate/compare_job.c tools/validate/same_program.c)
+  tools/validate/compare_job.c tools/exact/same_program.c)
 $(call obj,$(BUILD),$(LIBRARY_SOURCES)): defs += -fPIC -fno-semantic-interposition
 $(BUILD)/libassay.so.$(LIBRARY_ABI): $(call obj,$(BUILD),$(LIBRARY_SOURCES)) tools/library/assay.map | $(BUILD)/oiio.so
 	$(call say,LINK,$@)

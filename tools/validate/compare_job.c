@@ -1,5 +1,5 @@
 #include "compare_job.h"
-#include "same_program.h"
+#include "tools/exact/same_program.h"
 
 #include "tools/base/temp_dir.h"
 #include "tools/compare/hint.h"

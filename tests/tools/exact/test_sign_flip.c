@@ -5,7 +5,7 @@
 
 #include "tools/compare/region.h"
 #include "tools/exact/sign_flip_score.h"
-#include "tools/validate/same_program.h"
+#include "tools/exact/same_program.h"
 #include "tests/support/own.h"
 #include "tests/support/test.h"
 

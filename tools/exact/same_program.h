@@ -2,7 +2,7 @@
 #ifndef ASSAY_SAME_PROGRAM_H
 #define ASSAY_SAME_PROGRAM_H
 
-#include "tools/exact/sign_flip.h"
+#include "sign_flip.h"
 #include "tools/input/input.h"
 
 /* Judges path[0] against path[1]: two images of any kind that input.h reads (a PNG even without its curve), or
