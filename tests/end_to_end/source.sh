@@ -93,6 +93,7 @@ student other 'AFTER = mv tiny other'
 student hog 'AFTER = for i in 1 2 3 4; do (head -c 100M /dev/zero; sleep 20) | tail -n 1 >/dev/null & done; wait'
 student network 'AFTER = ! grep -v lo: /proc/net/dev | grep :' # lo alone
 student writes 'AFTER = ! (: >$$CCACHE_DIR/x) && ! (: >/cache/x)'
+mkdir "$tmp/class/readme" && echo later >"$tmp/class/readme/README"
 mkdir "$tmp/class/empty" "$tmp/class/two" && cp -R "$tmp/tree" "$tmp/class/two/a" && cp -R "$tmp/tree" "$tmp/class/two/b"
 # As it comes from a Mac: in a folder, with what another machine built.
 mkdir -p "$tmp/mac/My Homework/build/CMakeFiles" "$tmp/mac/__MACOSX" "$tmp/bomb"
@@ -139,7 +140,8 @@ said make no_return not_started 'killed by signal 6.*; its build warned: tiny.c:
 said make lost not_started 'It does not start: the shared library liblevel.so is missing'
 said make other not_started 'It does not start: building it made no tiny, but other'
 said make hog not_built 'It does not build: .*300 MiB of memory'
-said make empty not_built 'It does not build: there is no .*akefile in it'
+said make empty not_built 'It does not build: there is no file in it'
+said make readme not_built 'It does not build: there is no Makefile in it'
 said make two not_built 'It does not build: more than one folder holds a .*akefile: a b'
 said make bomb not_built 'It does not build: all 64 MiB of its directory are full'
 said make short not_built 'It does not build: short.zip cannot be unpacked: it is damaged, or no zip archive'

@@ -33,28 +33,67 @@ bool kept_run_path(const char *store, const char *of, const struct sandbox *s,
     return true;
 }
 
-/* Copies a file if it is there. */
-static bool copy_one(const char *name, const char *from, const char *to, struct err *e)
+/* Calls one() with each file that a job hands out, as long as it returns true. */
+static bool each_file(const struct sandbox_job *job, bool (*one)(void *ctx, const char *name),
+                      void *ctx)
 {
-    const struct path a = fs_path("%s/%s", from, name);
-    return access(a.s, R_OK) != 0 || fs_copy(a.s, fs_path("%s/%s", to, name).s, e);
+    bool ok = !job->keep_tree || one(ctx, "tree.tar");
+    for (const char *const *name = job->keep; ok && name != NULL && *name != NULL; name++)
+        ok = one(ctx, *name);
+    return ok;
 }
 
-static bool copy_all(const struct sandbox_job *job, const char *from, const char *to, struct err *e)
+struct copying {
+    const char *dir;
+    const struct sandbox_job *job;
+    json_t *files; /* name: SHA-256, or null for what was not there */
+    struct err *e;
+};
+
+static bool keep_file(struct copying *c, const char *name, const char *from)
 {
-    bool ok = !job->keep_tree || copy_one("tree.tar", from, to, e);
-    for (const char *const *name = job->keep; ok && name != NULL && *name != NULL; name++)
-        ok = copy_one(*name, from, to, e);
-    return ok;
+    const struct path to = fs_path("%s/%s", c->dir, name);
+    char sha256[65];
+    if (access(from, R_OK) != 0) {
+        json_object_set_new(c->files, name, json_null());
+        return true;
+    }
+    if (!fs_copy(from, to.s, c->e) || !sha256_file(to.s, sha256, c->e))
+        return false;
+    json_object_set_new(c->files, name, json_string(sha256));
+    return true;
+}
+
+static bool keep_one(void *ctx, const char *name)
+{
+    struct copying *c = ctx;
+    return keep_file(c, name, fs_path("%s/%s", c->job->out, name).s);
+}
+
+/* False also for a file that is not what was kept: after a power failure it may be empty. */
+static bool restore_file(const struct copying *c, const char *name, const char *to)
+{
+    const struct path from = fs_path("%s/%s", c->dir, name);
+    const json_t *kept = json_object_get(c->files, name);
+    char sha256[65];
+    return json_is_null(kept) ||
+           (json_is_string(kept) && sha256_file(from.s, sha256, c->e) &&
+            strcmp(json_string_value(kept), sha256) == 0 && fs_copy(from.s, to, c->e));
+}
+
+static bool restore_one(void *ctx, const char *name)
+{
+    const struct copying *c = ctx;
+    return restore_file(c, name, fs_path("%s/%s", c->job->out, name).s);
 }
 
 bool kept_run_read(const char *dir, const struct sandbox_job *job, struct sandbox_result *out)
 {
     struct err ignored; /* what cannot be read is run */
     json_t *run = json_load_file(fs_path("%s/run.json", dir).s, 0, NULL);
-    bool ok = run != NULL && fs_make_dirs(job->out, &ignored) &&
-              copy_all(job, dir, job->out, &ignored) &&
-              fs_copy(fs_path("%s/log", dir).s, job->log, &ignored);
+    struct copying c = {dir, job, json_object_get(run, "files"), &ignored};
+    bool ok = run != NULL && fs_make_dirs(job->out, &ignored) && each_file(job, restore_one, &c) &&
+              restore_file(&c, "log", job->log);
     *out = (struct sandbox_result){.end = (enum sandbox_end)member_number(run, "end"),
                                    .status = (int)member_number(run, "status"),
                                    .wall_s = member_number(run, "wall_s"),
@@ -67,12 +106,12 @@ bool kept_run_read(const char *dir, const struct sandbox_job *job, struct sandbo
 bool kept_run_write(const char *dir, const struct sandbox_job *job,
                     const struct sandbox_result *result, struct err *e)
 {
-    json_t *run =
-        json_pack("{si, si, sf, sf, ss}", "end", (int)result->end, "status", result->status,
-                  "wall_s", result->wall_s, "cpu_s", result->cpu_s, "why", result->why);
-    bool ok = fs_remove_tree(dir, e) && fs_make_dirs(dir, e) && copy_all(job, job->out, dir, e) &&
-              fs_copy(job->log, fs_path("%s/log", dir).s, e) &&
-              json_write(fs_path("%s/run.json", dir).s, run, e);
+    struct copying c = {dir, job, json_object(), e};
+    json_t *run = json_pack("{si, si, sf, sf, ss, so}", "end", (int)result->end, "status",
+                            result->status, "wall_s", result->wall_s, "cpu_s", result->cpu_s, "why",
+                            result->why, "files", c.files);
+    bool ok = fs_remove_tree(dir, e) && fs_make_dirs(dir, e) && each_file(job, keep_one, &c) &&
+              keep_file(&c, "log", job->log) && json_write(fs_path("%s/run.json", dir).s, run, e);
     json_decref(run);
     return ok;
 }

@@ -1,6 +1,6 @@
 /* A store of runs of submissions, with a key of all that decides a run: grading again with other points,
  * margins, hints or references runs nothing again. A run is a directory STORE/KEY: the files that it
- * handed out, its log, and run.json, which is written last. */
+ * handed out, its log, and run.json, which is written last and has their hashes. */
 #ifndef ASSAY_KEPT_RUN_H
 #define ASSAY_KEPT_RUN_H
 
@@ -16,7 +16,7 @@ NODISCARD bool kept_run_path(const char *store, const char *of, const struct san
                              struct path *dir, struct err *e);
 
 /* Restores a run as if the job had been run now: its files are in job->out, its log is at job->log.
- * False: it is not in the store. */
+ * False: it is not in the store, is damaged, or was kept for a job that handed out other files. */
 bool kept_run_read(const char *dir, const struct sandbox_job *job, struct sandbox_result *out);
 
 /* Adds a run to the store, in place of what is there. */

@@ -4,8 +4,10 @@
 #include "renderer/base/sha256.h"
 
 #include <errno.h>
+#include <limits.h>
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 #include <sys/stat.h>
@@ -194,7 +196,11 @@ void submission_id(const char *path, char id[128])
 {
     int n;
     bool archive;
+    char full[PATH_MAX];
     const char *at = name_of(path, &n, &archive);
+    if (((n == 1 && at[0] == '.') || (n == 2 && strncmp(at, "..", 2) == 0)) &&
+        realpath(path, full) != NULL)
+        at = name_of(full, &n, &archive);
     snprintf(id, 128, "%.*s", n, at);
 }
 

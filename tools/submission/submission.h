@@ -61,7 +61,7 @@ NODISCARD bool submission_stage(const struct rubric *r, const char *dir, struct 
 NODISCARD bool submission_open(const struct rubric *r, const char *path, const char *work,
                                struct submission *out, struct err *e);
 
-/* The last part of a path without the ending of an archive; "" if that is no name. */
+/* The last part of a path, of "." that of its full path, without the ending of an archive; "" if that is no name. */
 void submission_id(const char *path, char id[128]);
 
 /* Runs it, or restores the same run if that was kept (kept_run.h). inputs: the files in job->scene that it

@@ -55,7 +55,8 @@ static const char build_script[] =
     "done\n"
     "[ -n \"$BUILD\" ] || { chmod u+x \"$PROGRAM\" 2>/dev/null; exit 0; }\n"
     "case \" $(echo \"$BUILD\" | tr '\\n;&|()' '      ') \" in\n" /* as a word: not make.sh */
-    "  *' cmake '*) marker=CMakeLists.txt ;; *' make '*) marker=[Mm]akefile ;; *) marker= ;; esac\n"
+    "  *' cmake '*) marker=CMakeLists.txt named=$marker ;;\n"
+    "  *' make '*) marker=[Mm]akefile named=Makefile ;; *) marker= ;; esac\n"
     "if [ -n \"$marker\" ]; then\n"
     "  find . -name CMakeCache.txt -printf '%h\\n' | while IFS= read -r dir; do\n"
     "    if [ -e \"$dir/CMakeLists.txt\" ]; then rm -rf \"$dir/CMakeCache.txt\" \"$dir/CMakeFiles\"; else rm -rf \"$dir\"; fi\n"
@@ -65,11 +66,11 @@ static const char build_script[] =
     "  if [ -z \"$(find . -name \"$marker\" -print -quit)\" ]; then\n"
     "    top=${PROGRAM##*/}\n" /* it was built before */
     "    [ -e \"$PROGRAM\" ] || { [ -f \"$top\" ] && mkdir -p \"${PROGRAM%/*}\" && ln -s \"$PWD/$top\" \"$PROGRAM\"; } ||\n"
-    "      { echo \"there is no $marker in it\"; exit 97; }\n"
+    "      { [ -n \"$(find . -type f -print -quit)\" ] && echo \"there is no $named in it\" || echo \"there is no file in it\"; exit 97; }\n"
     "    exit 0\n"
     "  fi\n"
     "  [ \"$(echo \"$root\" | wc -l)\" = 1 ] ||\n"
-    "    { echo \"more than one folder holds a $marker:\" $root; exit 97; }\n"
+    "    { echo \"more than one folder holds a $named:\" $root; exit 97; }\n"
     "  [ -z \"$root\" ] || lift \"./$root\" || exit 97\n"
     "fi\n"
     "find . -newermt now -exec touch -h {} +\n"
