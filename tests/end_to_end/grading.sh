@@ -160,7 +160,31 @@ printf '# id check points reason\nbob cornell 3.5 shown to staff\n' >"$tmp/appea
 check "with an appeal" again --appeals "$tmp/appeals"
 check "its points" points bob 8.50
 check "of the same runs" test "$(times "$tmp/two")" = "$before"
-check "the appeal withdrawn, beside what was" "$build/assay" grade -q -o "$tmp/three" --before "$tmp/two" "$tmp/other.rubric" "$tmp/submissions"/*
+check "the appeal stands in the list" grep -q '^"bob",8.50,.*cornell by appeal' "$tmp/two/grades.csv"
+expect "appeals that are not named again: it is said" 0 "^1 decision of staff no longer applies, 'bob' cornell first, 3.50 points: name the file" \
+    "$build/assay" grade -q -o "$tmp/three" --before "$tmp/two" "$tmp/other.rubric" "$tmp/submissions"/*
+printf '# nobody\n' >"$tmp/withdrawn"
+"$build/assay" grade -q -o "$tmp/four" --before "$tmp/two" --appeals "$tmp/withdrawn" "$tmp/other.rubric" "$tmp/submissions/bob" 2>"$tmp/err"
+check "one that is withdrawn is not (control)" test ! -s "$tmp/err"
+rm -rf "$tmp/four"
+sed -n 1p "$tmp/appeals" >"$tmp/beyond" && echo 'bob cornell 5.5 shown' >>"$tmp/beyond"
+expect "more points than the check has" 3 "beyond:2: .*'5.5'.* 0 to 5, the points of 'cornell' in .*other.rubric" "$build/assay" grade -q -o "$tmp/four" --appeals "$tmp/beyond" "$tmp/other.rubric" "$tmp/submissions/bob"
+mkdir -p "$tmp/names/grades.csv" && cp -r "$tmp/submissions/ada" "$tmp/names/here"
+expect "a name that our own files have" 3 "grades.csv: 'grades.csv' is no name for a submission" "$build/assay" grade -q -o "$tmp/four" "$tmp/other.rubric" "$tmp/names/grades.csv"
+check "the folder one is in" env -C "$tmp/names/here" "$build/assay" grade -q -o "$tmp/four" "$tmp/other.rubric" .
+check "has its own name" grep -q '^"here",10.00,' "$tmp/four/grades.csv"
+# Kept runs whose files are no longer what they were, as after a power failure: each is run again, and the points stay.
+damage() { # COMMAND: on every kept image
+    local name
+    for name in "$tmp"/four/.runs/here/*/out.png; do "$@" "$name"; done
+    sed 's/^check point 5/check point 4/; s/^total.*/total 9/' "$tmp/other.rubric" >"$tmp/damaged.rubric"
+    "$build/assay" grade -q -o "$tmp/four" "$tmp/damaged.rubric" "$tmp/names/here" && grep -q '^"here",9.00,' "$tmp/four/grades.csv" &&
+        "$build/assay" grade -q -o "$tmp/four" "$tmp/other.rubric" "$tmp/names/here" && grep -q '^"here",10.00,' "$tmp/four/grades.csv"
+}
+check "kept images cut short" damage truncate -s 1000
+check "kept images emptied" damage truncate -s 0
+check "kept images removed" damage rm
+rm -rf "$tmp/four"
 check "of the same runs" test "$(times "$tmp/three")" = "$before"
 expect "grades that are not there" 3 "no: No such file or directory" "$build/assay" grade -q -o "$tmp/four" --before "$tmp/no" "$tmp/other.rubric" "$tmp/submissions"/*
 check "and nothing is graded" test ! -e "$tmp/four"

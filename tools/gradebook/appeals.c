@@ -34,9 +34,13 @@ static bool read_line(char *line, const struct rubric *r, struct appeal *out, st
         if (strcmp(r->check[out->check].name, check) == 0)
             break;
     if (out->check == r->num_checks)
-        return err_set(e, "'%s' is no check of %s", check, r->path);
-    if (!cli_double("points", points, 0, r->check[out->check].points, &out->points, e))
-        return false;
+        return err_set(e,
+                       "'%s' is no check of %s: take the line out, or keep a file for each rubric",
+                       check, r->path);
+    if (!cli_double("points", points, 0, r->check[out->check].points, &out->points, e)) {
+        const struct err why = *e;
+        return err_set(e, "%.300s, the points of '%s' in %s", why.msg, check, r->path);
+    }
     if (rest[0] == '\0')
         return err_set(e, "no reason given");
     if (strlen(id) >= sizeof out->id || strlen(rest) >= sizeof out->reason)

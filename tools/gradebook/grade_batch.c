@@ -423,7 +423,8 @@ static bool check_ids(const struct grade_job *job, struct err *e)
         submission_id(job->s->submission[i], id);
         json_t *text = json_string(id); /* NULL: no UTF-8 */
         json_decref(text);
-        if (id[0] == '\0' || strlen(id) > 120 || id[0] == '.' || text == NULL)
+        if (id[0] == '\0' || strlen(id) > 120 || id[0] == '.' || text == NULL ||
+            grade_writes_file(id))
             return err_set(e, "%s: '%s' is no name for a submission", job->s->submission[i], id);
         for (int k = 0; k < i; k++) {
             submission_id(job->s->submission[k], other);

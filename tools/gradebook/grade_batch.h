@@ -33,6 +33,8 @@ struct grade_job {
  * *grades: a new array, in the order of job->s->submission. */
 NODISCARD bool grade_batch_run(const struct grade_job *job, json_t **grades, struct err *e);
 
+/* Is it the name of a file of the class? No submission can have it, as their folders are beside. */
+bool grade_writes_file(const char *name);
 /* Writes what follows from the grades: for the class OUT/grades.json (the array), grades.csv,
  * junit.xml and index.html (for staff); for each submission OUT/ID/results.json as Gradescope reads
  * it, index.html, and staff.html, which shows the references (r, a NULL: none). A page needs no

@@ -22,8 +22,11 @@ static void compare(json_t *list, const char *name, const json_t *was, const jso
 {
     if (was == NULL || is == NULL ||
         fabs(member_number(was, "points") - member_number(is, "points")) >= told)
-        json_array_append_new(list, json_pack("{ss, so, so}", "name", name, "was", points_of(was),
-                                              "is", points_of(is)));
+        json_array_append_new(list, json_pack("{ss, so, so, ss*}", "name", name, "was",
+                                              points_of(was), "is", points_of(is), "appeal",
+                                              is == NULL || member_text(is, "appeal") == NULL
+                                                  ? member_text(was, "appeal")
+                                                  : NULL));
 }
 
 json_t *grade_change(const json_t *old, const json_t *grade)
@@ -34,7 +37,8 @@ json_t *grade_change(const json_t *old, const json_t *grade)
     json_each(c, json_object_get(old, "checks"))
         if (find(grade, member_or_empty(c, "name")) == NULL)
             compare(list, member_or_empty(c, "name"), c, NULL);
-    if (old == NULL || json_array_size(list) == 0) {
+    if (old == NULL ||
+        (json_array_size(list) == 0 && member_number(old, "of") == member_number(grade, "of"))) {
         json_decref(list);
         return NULL;
     }
@@ -53,8 +57,9 @@ void grade_change_text(const json_t *grade, char *out, size_t size)
         char was[32], is[32];
         snprintf(was, sizeof was, "%.2f", member_number(c, "was"));
         snprintf(is, sizeof is, "now %.2f", member_number(c, "is"));
-        text_append(out, size, "; %s %s, %s", member_or_empty(c, "name"),
+        text_append(out, size, "; %s %s%s, %s", member_or_empty(c, "name"),
                     json_is_null(json_object_get(c, "was")) ? "not asked" : was,
+                    member_text(c, "appeal") != NULL ? " by appeal" : "",
                     json_is_null(json_object_get(c, "is")) ? "not asked now" : is);
     }
 }

@@ -5,7 +5,7 @@
 #include <jansson.h>
 #include <stddef.h>
 
-/* "before" of a grade (tools/docs/formats/grades.md) that had been `old`; NULL where no points changed, or old is NULL. A new
+/* "before" of a grade (tools/docs/formats/grades.md) that had been `old`; NULL where neither its points, checks nor their sum changed, or old is NULL. A new
  * reference. */
 json_t *grade_change(const json_t *old, const json_t *grade);
 

@@ -129,6 +129,29 @@ static void warn_of_strangers(const char *file, const struct appeals *a, const j
     }
 }
 
+/* Points that staff gave before are gone if a file of appeals is not named again. */
+static void warn_of_withdrawn(const json_t *grades)
+{
+    const json_t *of = NULL, *first = NULL;
+    int num = 0;
+    json_each(g, grades) {
+        json_each(c, json_object_get(json_object_get(g, "before"), "checks")) {
+            if (member_text(c, "appeal") == NULL)
+                continue;
+            if (num++ == 0) {
+                of = g;
+                first = c;
+            }
+        }
+    }
+    if (num > 0)
+        fprintf(
+            stderr,
+            "%d decision%s of staff no longer appl%s, '%s' %s first, %.2f points: name the file with --appeals each time\n",
+            num, num > 1 ? "s" : "", num > 1 ? "y" : "ies", member_or_empty(of, "id"),
+            member_or_empty(first, "name"), member_number(first, "was"));
+}
+
 /* Says which submissions have been graded into that directory before and are not in its list now: a class of which one
  * was graded again would look as if it had one member. */
 static void warn_of_others(const char *out, const json_t *grades)
@@ -185,6 +208,8 @@ static int run_batch(const struct grade_settings *s, const struct rubric *r,
     ok = ok && grade_batch_run(&job, &grades, e) && same_noise(s->out, r, answers, grades, e);
     if (ok)
         warn_of_strangers(s->appeals, &appeals, grades);
+    if (ok && s->appeals == NULL)
+        warn_of_withdrawn(grades);
     if (ok && grade_write(s->out, r, answers, grades, e)) {
         warn_of_others(s->out, grades);
         size_t need = need_staff(grades), lost = in_trouble(grades, e);

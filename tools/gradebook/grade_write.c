@@ -153,6 +153,19 @@ static void csv_text(FILE *f, const char *text)
     fputc('"', f);
 }
 
+/* What a list of points cannot show: why there are none, what is wrong, and which points staff gave. */
+static void remark_of(const json_t *grade, char *out, size_t size)
+{
+    snprintf(out, size, "%s",
+             member_or_empty(grade, member_text(grade, "trouble") != NULL ? "trouble"
+                                    : member_text(grade, "wrong") != NULL ? "wrong"
+                                                                          : "flag"));
+    json_each(c, json_object_get(grade, "checks"))
+        if (member_text(c, "appeal") != NULL)
+            text_append(out, size, "%s%s by appeal", out[0] != '\0' ? "; " : "",
+                        member_or_empty(c, "name"));
+}
+
 static void write_csv(FILE *f, const json_t *grades)
 {
     const json_t *first = NULL;
@@ -166,11 +179,11 @@ static void write_csv(FILE *f, const json_t *grades)
     }
     fputs("\r\n", f);
     json_each(g, grades) {
+        char remark[1024];
         csv_text(f, member_or_empty(g, "id"));
         fprintf(f, ",%.2f,%g,", member_number(g, "points"), member_number(g, "of"));
-        csv_text(f, member_or_empty(g, member_text(g, "trouble") != NULL ? "trouble"
-                                       : member_text(g, "wrong") != NULL ? "wrong"
-                                                                         : "flag"));
+        remark_of(g, remark, sizeof remark);
+        csv_text(f, remark);
         json_each(c, json_object_get(g, "checks"))
             fprintf(f, ",%.2f", member_number(c, "points"));
         fputs("\r\n", f);
@@ -256,6 +269,14 @@ static bool write_text(const json_t *grades, const char *name, FILE *f, struct e
 
 static const char *const class_files[] = {"grades.csv", "junit.xml", "index.html", NULL};
 static const char *const pages[] = {"index.html", "staff.html", NULL};
+
+bool grade_writes_file(const char *name)
+{
+    bool found = strcmp(name, "grades.json") == 0;
+    for (int k = 0; class_files[k] != NULL; k++)
+        found = found || strcmp(name, class_files[k]) == 0;
+    return found;
+}
 
 /* Writes one of these files. grades: the array for a file of the class, one grade for a
  * submission's page; view: what the student may see of it. */
