@@ -2,8 +2,7 @@
 
 #include <string.h>
 
-/* Columns that UTF-8 text fills, taking each code point as one column wide. */
-static size_t columns_of(const char *s)
+size_t text_table_width(const char *s)
 {
     size_t n = 0;
     for (; *s != '\0'; s++)
@@ -24,13 +23,13 @@ static void print_aligned(FILE *f, const struct text_table *t)
     size_t width[TEXT_TABLE_COLUMNS] = {0};
     for (size_t row = 0; row <= t->num_rows; row++)
         for (size_t c = 0; c < t->num_columns; c++) {
-            size_t w = columns_of(text_of(t, row, c, false, buffer));
+            size_t w = text_table_width(text_of(t, row, c, false, buffer));
             width[c] = w > width[c] ? w : width[c];
         }
     for (size_t row = 0; row <= t->num_rows; row++) {
         for (size_t c = 0; c < t->num_columns; c++) {
             const char *text = text_of(t, row, c, false, buffer);
-            int gap = (int)(width[c] - columns_of(text));
+            int gap = (int)(width[c] - text_table_width(text));
             bool right = t->column[c].is_number, is_last = c + 1 == t->num_columns;
             fprintf(f, "%*s%s%*s%s", right ? gap : 0, "", text, right || is_last ? 0 : gap, "",
                     is_last ? "\n" : "  ");

@@ -24,6 +24,9 @@ struct text_table {
 };
 void text_table_print(FILE *f, const struct text_table *t, bool markdown);
 
+/* Columns that UTF-8 text fills, taking each code point as one column wide. */
+size_t text_table_width(const char *text);
+
 /* Prints text with whatever would end a cell or start markup escaped. */
 void text_table_escape(FILE *f, const char *text);
 

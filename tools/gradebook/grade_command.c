@@ -7,6 +7,7 @@
 #include "renderer/base/fs.h"
 #include "tools/results/results.h"
 #include "tools/base/data_dirs.h"
+#include "tools/base/text_table.h"
 #include "tools/base/dir_lock.h"
 #include "tools/submission/rubric_variant.h"
 #include "grade_batch.h"
@@ -82,7 +83,9 @@ static void tell(const struct grade_settings *s, int num, const json_t *grade)
     grade_change_text(grade, change, sizeof change);
     if (s->quiet)
         return;
-    printf("[%d/%d] %-32s ", num, s->num, member_text(grade, "id"));
+    const char *id = member_text(grade, "id");
+    const int width = (int)text_table_width(id);
+    printf("[%d/%d] %s%*s ", num, s->num, id, width < 32 ? 32 - width : 0, "");
     if (trouble != NULL)
         printf("NOT GRADED: %s\n", trouble);
     else
