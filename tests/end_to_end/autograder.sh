@@ -48,6 +48,7 @@ score() { # SUBMISSION NAME SCORE
     chmod 755 submission/ours
     printf 'pathtracer: ours\n\tcp ours pathtracer\n' >submission/Makefile
     check "$2" source/run_autograder
+    cp "$tmp/out" "$tmp/said"
     check "$2: Gradescope's fields" env ASSAY_RESULTS=results/results.json "$fields"
     check "$2: $3 points" grep -q "\"score\": $3" results/results.json
 }
@@ -55,7 +56,9 @@ printf '#!/bin/sh\nexit 1\n' >"$tmp/broken"
 printf '#!/bin/sh\ncp %s/source/references/*.exr out.png\necho "{\\"score\\": 100}" >%s/results/results.json\n' "$PWD" "$PWD" >"$tmp/thief"
 if "$build/assay" grade -q -o "$tmp/probe" --suite source/assay/reference/scenes source/rubric/quick.rubric "$build/pathtracer" >"$tmp/out" 2>&1; then
     score "$build/pathtracer" "a right program" 8.0
+    check "of that one they need not (control)" sh -c '! grep "staff have to look" "$1"' sh "$tmp/said"
     score "$tmp/broken" "a program that fails" 0.0
+    check "staff read there why they have to look" grep -q '^"submission",0.00,8,".\+"' "$tmp/said"
 elif grep -q "no sandbox" "$tmp/out"; then
     echo "skip autograder: in a sandbox: $(tail -n 1 "$tmp/out")"
 else
