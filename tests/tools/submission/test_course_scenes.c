@@ -75,7 +75,7 @@ TEST(each_broken_rule_is_seen)
         {"matt.dae",
          "<extra><technique profile=\"CGL\"><area><color>2.5 2.5 2.5</color></area></technique></extra>",
          "", "an extra of CGL"},
-        {"lights.dae", " -0.8700628 ", " 0.8700628 ", "its own axis"},
+        {"lights.dae", " -2.598076 ", " 2.598076 ", "its own axis"},
         {"matt.dae", "<material id=\"matt\" name=\"matt\">", "<material id=\"matt\">",
          "a material has"},
         {"matt.dae", "target=\"#matt\"", "target=\"#mat\"", "a material has"},
