@@ -25,7 +25,7 @@ SUPPORT := $(filter-out $(TESTS) $(PROGRAMS) $(BENCH) tests/support/asan_options
 # Run without sanitizers: simulations of thousands of claims, and closed forms and other programs against millions of
 # rays and samples. Other tests run the same code with them (test_widths every material, light and option, test_bvh_wide
 # all of the tracing).
-RATES   := $(addprefix test_,alpha_spending calibration compare_rates converge diagnose noise_estimate permutation sign_flip statistics)
+RATES   := $(addprefix test_,alpha_spending calibration compare_rates converge diagnose noise_estimate paired_rates permutation sign_flip statistics)
 TRUTHS  := $(addprefix test_,embree independence integrator lights materials metamorphic povray_optics suite_scenes truth_lens \
   truth_mirrors_and_glass)
 PLAIN   := $(RATES) $(TRUTHS)

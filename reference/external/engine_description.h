@@ -41,10 +41,10 @@ struct engine_options {
     int threads;
     double timeout_s;     /* of one process; it is killed (whole process group) after that */
     const char *work_dir; /* exists; gets a sub-directory, removed on success */
-    /* NULL, or the hashes of images rendered earlier, "images_sha256" of a manifest: engine_render() ends at the first
-     * image of "mean" that is another or is not among them, and sets *differs. */
+    /* NULL, or the hashes of images rendered earlier, "images_sha256" of a manifest: at the first image of "mean" that
+     * is another or is not among them engine_render() sets *differs and, unless goes_on, ends. */
     const json_t *same_as;
-    bool *differs;
+    bool goes_on, *differs;
     /* NULL, or called with each image (RGB, 3 floats a pixel) of "mean" in their order. */
     void (*on_replicate)(void *ctx, int k, const float *pixels_rgb);
     void *on_replicate_ctx;
@@ -78,10 +78,11 @@ NODISCARD bool engine_expresses(const struct engine *en, const struct suite_scen
 /* Renders. The caller frees *out and *manifest (a new reference). The unit of *out is "replicate", "exact", "sample"
  * or, for a single image whose noise is unknown, "picture". The manifest's members are those of reference_render.h,
  * plus "description_sha256", "files" (the hash of each file of {here} that the command names) and, of "mean",
- * "images_sha256" (of each image, as floats in memory). "mean": K runs with different seeds, folded. Fails, with the program's last lines, if it is missing, dies, hangs or writes no image, an
- * image of another size, without R, G and B, with pixels that are not finite, or the same image for two seeds (unless
- * that image has no noise at all: then it is "exact"), or if replicates fail independence_check(). Its files are then
- * kept, and the line names their directory. */
+ * "images_sha256" (of each image, as floats in memory) and, unless pixels share samples, "blocks" (block_means.h).
+ * "mean": K runs with different seeds, folded. Fails, with the program's last lines, if it is missing, dies, hangs or
+ * writes no image, an image of another size, without R, G and B, with pixels that are not finite, or the same image
+ * for two seeds (unless that image has no noise at all: then it is "exact"), or if replicates fail
+ * independence_check(). Its files are then kept, and the line names their directory. */
 NODISCARD bool engine_render(const struct engine *en, const struct suite_scene *scene,
                              const struct engine_options *opt, struct moments *out,
                              json_t **manifest, struct err *e);

@@ -18,8 +18,8 @@ struct engine_job {
     int spp, replicates;
     bool half; /* some image had fewer than 32 bits */
     double cpu_s;
-    json_t *images,
-        *independence; /* what the manifest gets of "output": "mean" (independence_check()) */
+    json_t *images, *independence,
+        *blocks; /* what the manifest gets of "output": "mean": hashes, independence_check(), block_means.h */
 };
 
 /* Checks the features and writes the scene to paths[0], or a grey scene for each channel. For "dae" and "file" it only

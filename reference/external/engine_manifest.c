@@ -138,5 +138,7 @@ bool engine_describe(const struct engine_job *j, const struct moments *m, double
     json_object_update(*manifest, j->independence);
     if (json_array_size(j->images) > 0)
         json_object_set(*manifest, "images_sha256", j->images);
+    if (j->blocks != NULL)
+        json_object_set(*manifest, "blocks", j->blocks);
     return ok;
 }

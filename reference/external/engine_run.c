@@ -2,6 +2,7 @@
 #define _GNU_SOURCE
 #include "engine_internal.h"
 
+#include "reference/replicates/block_means.h"
 #include "reference/replicates/engine_driver.h"
 #include "reference/replicates/independence.h"
 #include "reference/replicates/replicate_images.h"
@@ -131,7 +132,7 @@ static void make_single(struct moments *m, const char *unit, double n)
         m->n[p] = n;
 }
 
-/* Fails if it is to be another. */
+/* Fails if it is another image than it has to be. */
 static bool add_hash(struct engine_job *j, const char *sha256, struct err *e)
 {
     const json_t *same = j->opt->same_as;
@@ -141,7 +142,7 @@ static bool add_hash(struct engine_job *j, const char *sha256, struct err *e)
     if (same == NULL || (has != NULL && strcmp(has, sha256) == 0))
         return true;
     *j->opt->differs = true;
-    return err_set(e, "image %zu is another one", k);
+    return j->opt->goes_on || err_set(e, "image %zu is another one", k);
 }
 
 /* Runs, reads and folds. */
@@ -150,8 +151,12 @@ static bool fold_runs(struct engine_job *j, struct moments *m, struct err *e)
     size_t pixels = (size_t)m->width * (size_t)m->height;
     struct replicate_repeats repeats;
     struct replicates seen = {0};
+    struct block_means blocks = {0};
+    const bool has_blocks = j->en->output == OUTPUT_MEAN && !j->en->shares_samples;
     bool ok = replicate_repeats_alloc(&repeats, j->replicates, e) &&
-              replicates_alloc(&seen, m->width, m->height, j->replicates, e);
+              replicates_alloc(&seen, m->width, m->height, j->replicates, e) &&
+              (!has_blocks ||
+               block_means_alloc(&blocks, m->width, m->height, j->suite->tile, j->replicates, e));
     if (j->en->shares_samples)
         seen.sharing = pixel_filter_sharing(&j->en->filter, 2);
     for (int k = 0; ok && k < j->replicates; k++) {
@@ -173,6 +178,7 @@ static bool fold_runs(struct engine_job *j, struct moments *m, struct err *e)
                              : "");
         moments_add_image(m, px);
         replicates_add(&seen, px);
+        ok = ok && (!has_blocks || block_means_add(&blocks, px, e));
         if (j->opt->on_replicate != NULL)
             j->opt->on_replicate(j->opt->on_replicate_ctx, k, px);
         free(px);
@@ -182,7 +188,10 @@ static bool fold_runs(struct engine_job *j, struct moments *m, struct err *e)
     else if (ok && (j->en->output == OUTPUT_EXACT || repeats.without_noise))
         make_single(m, "exact", 1);
     else if (ok)
-        ok = independence_check(&seen, j->independence, e);
+        ok = independence_check(&seen, j->independence, e) &&
+             (!has_blocks || (j->blocks = block_means_to_json(&blocks)) != NULL ||
+              err_set(e, "out of memory"));
+    block_means_free(&blocks);
     replicates_free(&seen);
     replicate_repeats_free(&repeats);
     return ok;
@@ -259,9 +268,10 @@ bool engine_render(const struct engine *en, const struct suite_scene *scene,
               fs_remove_tree(dir.s, e);
     json_decref(j.independence);
     json_decref(j.images);
+    json_decref(j.blocks);
     if (ok)
         return true;
-    if (opt->same_as != NULL && *opt->differs && fs_remove_tree(dir.s, e))
+    if (opt->same_as != NULL && *opt->differs && !opt->goes_on && fs_remove_tree(dir.s, e))
         return false;
     if (rendered)
         moments_free(out);

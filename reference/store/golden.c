@@ -101,6 +101,25 @@ bool golden_settle(const char *golden_dir, const char *scene, const char *engine
     return ok;
 }
 
+/* Block means are as long as an image: an attribute of it, of which the manifest keeps the rest. */
+static const char blocks_attr[] = "assay:blocks";
+
+/* Reads them into a copy of the entry, a new reference; NULL: out of memory. */
+static json_t *with_blocks(const json_t *entry, const char *exr)
+{
+    json_t *copy = json_copy((json_t *)entry), *blocks = json_copy(json_object_get(copy, "blocks"));
+    struct image head;
+    struct err ignored;
+    if (blocks != NULL && image_read_exr_head(exr, &head, &ignored)) {
+        const char *values = image_get_attr(&head, blocks_attr);
+        json_object_set_new(blocks, "values", json_string(values));
+        json_object_set(copy, "blocks", blocks);
+        image_free(&head);
+    }
+    json_decref(blocks);
+    return copy;
+}
+
 /* The new image waits beside the old one until the manifest names it by its hash; the manifest's rename decides.
  * Whatever a kill leaves, image_of() finds the image that the manifest describes. */
 bool golden_write(const char *golden_dir, const char *scene, const char *engine,
@@ -111,13 +130,19 @@ bool golden_write(const char *golden_dir, const char *scene, const char *engine,
     int lock = lock_directory(golden_dir, scene, e);
     if (lock < 0)
         return false;
-    json_t *all = json_read_object(at.manifest.s, e), *entry = json_copy(manifest);
-    const struct image_attr attrs[] = {{"assay:scene", scene}, {"assay:engine", engine}};
+    json_t *all = json_read_object(at.manifest.s, e), *entry = json_copy(manifest),
+           *blocks = json_copy(json_object_get(manifest, "blocks"));
+    const char *values = member_text(blocks, "values");
+    const struct image_attr attrs[] = {
+        {"assay:scene", scene}, {"assay:engine", engine}, {blocks_attr, values}};
     bool ok = all != NULL && settle(json_object_get(all, engine), at.exr.s, at.next.s, e);
-    bool waits = ok && moments_write(at.next.s, m, attrs, 2, e);
+    bool waits = ok && moments_write(at.next.s, m, attrs, values != NULL ? 3 : 2, e);
     ok = waits && sha256_file(at.next.s, sha256, e);
     if (ok) {
         json_object_set_new(entry, "exr_sha256", json_string(sha256));
+        json_object_del(blocks, "values");
+        if (blocks != NULL)
+            json_object_set(entry, "blocks", blocks);
         json_object_set(all, engine, entry);
         ok = json_write(at.manifest.s, all, e);
     }
@@ -126,6 +151,7 @@ bool golden_write(const char *golden_dir, const char *scene, const char *engine,
     if (ok && rename(at.next.s, at.exr.s) != 0)
         ok = err_set(e, "%s: cannot write: %s", at.exr.s, strerror(errno));
     json_decref(entry);
+    json_decref(blocks);
     json_decref(all);
     close(lock);
     return ok;
@@ -256,9 +282,10 @@ void golden_inspect(const char *golden_dir, const struct suite_scene *scene,
                 engine_with_goldens(ref->engine) != NULL ? ": `make golden` makes it" : "");
     } else {
         bool fits = check_entry(entry, scene, ref, where, &stale);
-        if (read_pair(image_of(entry, at.exr.s, at.next.s), entry, &out->m, e)) {
+        const char *exr = image_of(entry, at.exr.s, at.next.s);
+        if (read_pair(exr, entry, &out->m, e)) {
             out->state = fits ? GOLDEN_CURRENT : GOLDEN_STALE;
-            out->manifest = json_incref(entry);
+            out->manifest = with_blocks(entry, exr);
         }
         if (!fits)
             *e = stale;

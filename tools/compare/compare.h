@@ -16,6 +16,9 @@ struct compare_options {
                                as different estimators differ rightly; else its interval must lie
                                inside for EQUIVALENT and NO DIFFERENCE FOUND */
     int threads;            /* upper limit; at most 5 are used; the results do not depend on it */
+    bool
+        is_paired; /* A is B, which is exact, plus differences of pairs (block_means.h): both are of equally many
+                       paths, so that B does not show what A has missed */
 };
 
 /* The claim's tests in groups, each with its own part of alpha. */

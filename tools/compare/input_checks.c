@@ -200,8 +200,8 @@ bool input_checks_run(const struct moments *a, const struct moments *b,
         return err_prefix(e, "A");
     if (!check_side(b, j, &observed[1], e))
         return err_prefix(e, "B");
-    j->may_miss[0] = is_far_longer(b, observed[1], a, observed[0]);
-    j->may_miss[1] = is_far_longer(a, observed[0], b, observed[1]);
+    j->may_miss[0] = !opt->is_paired && is_far_longer(b, observed[1], a, observed[0]);
+    j->may_miss[1] = !opt->is_paired && is_far_longer(a, observed[0], b, observed[1]);
     if (!check_shared(a, b, e))
         return false;
     for (int c = 0; c < 3; c++)

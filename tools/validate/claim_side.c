@@ -196,12 +196,17 @@ static bool render_engine(const struct validation *v, struct side *s, int stage,
                                       .timeout_s = program_time(v),
                                       .work_dir = o->out_dir,
                                       .same_as = s->same_as,
+                                      .goes_on = s->goes_on,
                                       .differs = &s->differs};
     const struct path path =
         full_path(v, fs_path("%s.json", stem_of(v, s, stage, LOOK_DECLARED).s).s);
     if (!engine_render(o->engine, s->scene, &eo, &out->m, &out->manifest, e))
         return false;
-    return fs_make_parent_dirs(path.s, e) && json_write(path.s, out->manifest, e);
+    json_t *told = json_copy(out->manifest);
+    json_object_del(told, "blocks"); /* as long as an image */
+    const bool ok = fs_make_parent_dirs(path.s, e) && json_write(path.s, told, e);
+    json_decref(told);
+    return ok;
 }
 
 /* Adds `before` to `more`, or copies it if `more` has no image. The manifest becomes that of `before`, with the

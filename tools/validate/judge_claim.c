@@ -31,6 +31,12 @@ static void add_place(json_t *words, const char *option, const char *place, stru
         add_option(words, option, json_string(place));
 }
 
+/* What of an alpha is left for images of fresh seeds, or was for pairs. */
+static double alpha_left(const struct claim_run *t, double alpha)
+{
+    return t->tried_pairs ? alpha / 2 : alpha;
+}
+
 /* The command that judges this claim alone with the alpha that it has here, to free(); NULL: out of memory. */
 static char *rerun_command(const struct validation *v, const struct claim_run *t)
 {
@@ -39,12 +45,14 @@ static char *rerun_command(const struct validation *v, const struct claim_run *t
     char name[CLAIM_NAME];
     claim_run_name(t, name);
     /* The stages of the whole run: the claim's share of alpha alone might ask for two. */
+    const bool fresh = t->seeds == SEEDS_FRESH;
     json_t *w = json_pack("[s,s,s,s,o,s,o,s,o]", "validate", "--only", name, "--alpha",
-                          json_sprintf("%.6g", v->alpha), "--stages", json_sprintf("%d", v->stages),
-                          "--seed", json_sprintf("%llu", (unsigned long long)o->seed));
+                          json_sprintf("%.6g", fresh ? alpha_left(t, v->alpha) : v->alpha),
+                          "--stages", json_sprintf("%d", v->stages), "--seed",
+                          json_sprintf("%llu", (unsigned long long)o->seed));
     if (o->live)
         add_option(w, "--live", NULL);
-    if (o->live || (o->engine != NULL && !t->is_repeated))
+    if (o->live || (o->engine != NULL && fresh))
         add_option(w, "--reference-seed", json_sprintf("%u", o->reference_seed));
     if (o->engine != NULL)
         add_option(w, "--engine", json_string(o->engine->file));
@@ -66,7 +74,7 @@ static char *rerun_command(const struct validation *v, const struct claim_run *t
 
 static struct compare_options options_of(const struct claim_run *t, double alpha)
 {
-    return (struct compare_options){.alpha = alpha,
+    return (struct compare_options){.alpha = alpha_left(t, alpha),
                                     .margin_global = t->ref.margin_global,
                                     .margin_tile = t->ref.margin_tile,
                                     .margin_variance = t->ref.margin_variance,
@@ -125,8 +133,10 @@ static void add_provenance(json_t *claim, const struct validation *v, const stru
         json_object_set_new(claim, "version_a", json_string(version_a));
     json_t *version = json_object_get(b->manifest, "version");
     json_t *seeds = json_object_get(b->manifest, "seeds");
-    if (t->is_repeated || t->again.differs)
-        json_object_set_new(claim, "same_bits", json_boolean(t->is_repeated));
+    if (t->seeds != SEEDS_FRESH || t->again.differs)
+        json_object_set_new(claim, "same_bits", json_boolean(t->seeds == SEEDS_SAME_BITS));
+    if (t->tried_pairs)
+        json_object_set_new(claim, "paired", json_boolean(t->seeds == SEEDS_PAIRED));
     if (version != NULL)
         json_object_set(claim, "version_b", version);
     if (seeds != NULL)
@@ -315,11 +325,12 @@ static void look(struct validation *v, struct claim_run *t)
     int stage = 0;
     double before_a = t->a->cpu_s, before_b = t->b->cpu_s;
     struct side *const first = t->a;
-    t->is_repeated = t->seen[0] == NULL && repeated_seeds_render(v, t, p.image);
-    bool ok = t->is_repeated ? repeated_seeds_judge(p.image, &opt, &c, &e)
-                             : alpha_spending_judge(t->looks, t->next, t->stages, &opt, both_of, &p,
-                                                    &c, &stage, &e);
-    if (ok && !t->is_repeated &&
+    bool ok = t->seen[0] == NULL && repeated_seeds_judge(v, t, &opt, p.image, &c);
+    if (!ok) {
+        opt = options_of(t, v->alpha);
+        ok = alpha_spending_judge(t->looks, t->next, t->stages, &opt, both_of, &p, &c, &stage, &e);
+    }
+    if (ok && t->seeds == SEEDS_FRESH &&
         !hint_add(p.is_estimated ? &p.estimated[0] : &p.image[0]->m,
                   p.is_estimated ? &p.estimated[1] : &p.image[1]->m, 1, &c, &e)) {
         comparison_free(&c);
@@ -346,10 +357,11 @@ static void look(struct validation *v, struct claim_run *t)
     t->stage = stage;
     t->look = t->next++;
     memcpy(t->seen, p.image, sizeof t->seen);
-    json_array_append_new(t->history, json_pack("{sf,sf,sf,si,ss}", "n_a", p.image[0]->m.n[0],
-                                                "n_b", p.image[1]->m.n[0], "alpha",
-                                                v->alpha * t->looks->share[t->look], "stage",
-                                                stage + 1, "verdict", verdict_name(c.verdict)));
+    const double alpha = t->seeds == SEEDS_PAIRED ? v->alpha / 2 : v->alpha;
+    json_array_append_new(t->history,
+                          json_pack("{sf,sf,sf,si,ss}", "n_a", p.image[0]->m.n[0], "n_b",
+                                    p.image[1]->m.n[0], "alpha", alpha * t->looks->share[t->look],
+                                    "stage", stage + 1, "verdict", verdict_name(c.verdict)));
     claim_next_look(t);
     if (verdict_decides(c.verdict))
         finish(v, t, NULL);

@@ -42,12 +42,12 @@ struct side {
     const struct suite_variant *variant; /* SIDE_OURS; NULL: pathtracer itself */
     const struct suite_reference *ref;   /* SIDE_TRUTH to SIDE_LIVE */
     int users;                           /* claims that may want another look */
-    /* SIDE_ENGINE: NULL, or the reference with whose seed it is rendered as long as its images are the same; differs: they
-     * were not, so that it failed. */
+    /* SIDE_ENGINE: NULL, or the reference with whose seed it is rendered; differs: an image was not the same, at which it
+     * fails unless it goes on. */
     const char *of;
     uint32_t seed;
     const json_t *same_as;
-    bool differs;
+    bool differs, goes_on;
     struct side_image at[NUM_STAGES][NUM_LOOKS];
     double wall_s, units; /* rendered in this run: wall seconds and observations */
     double cpu_s;
@@ -68,8 +68,13 @@ struct claim_run {
     const struct suite_scene *scene;
     struct side *a, *b; /* NULL: the claim of consistency, or of noise */
     bool of_noise;
-    struct side again; /* a, if the engine makes the same bits as b with its seeds */
-    bool is_repeated;
+    struct side again; /* the engine with the seeds of b; a, if that decides (repeated_seeds.c) */
+    enum {
+        SEEDS_FRESH,
+        SEEDS_SAME_BITS,
+        SEEDS_PAIRED
+    } seeds;                    /* what decided, or was looked at last */
+    bool tried_pairs;           /* half of alpha is for them */
     struct suite_reference ref; /* b's name and class; the claim's margins */
     enum verdict expected;
     const struct alpha_spending *looks;
@@ -136,13 +141,12 @@ NODISCARD bool side_renewal(const struct validation *v, const struct side *s,
                             const json_t *manifest, json_t **out);
 void side_free(struct side *s);
 
-/* repeated_seeds.c: does the claim's engine make the same bits as the stored reference, with its seeds? Then t->a is the
- * engine of these seeds, whose image is image[0]; image[1] is b's. */
-bool repeated_seeds_render(struct validation *v, struct claim_run *t, struct side_image *image[2]);
-/* The comparison of two such images, without any noise. Fails as compare_moments(). */
-NODISCARD bool repeated_seeds_judge(struct side_image *const image[2],
-                                    const struct compare_options *opt, struct comparison *out,
-                                    struct err *e);
+/* repeated_seeds.c: judges an engine by the images that it makes with the seeds of the stored reference, by their bits or
+ * in pairs. True if that decides: out is the comparison, t->a the engine of these seeds and image[] what was compared.
+ * opt->alpha: that of the claim, of which pairs take half. */
+bool repeated_seeds_judge(struct validation *v, struct claim_run *t,
+                          const struct compare_options *opt, struct side_image *image[2],
+                          struct comparison *out);
 
 /* Does --only select any claim of a scene? All of them? */
 bool scene_is_selected(const struct validate_options *o, const char *name);
