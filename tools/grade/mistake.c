@@ -39,12 +39,18 @@ static bool is_seen(const struct grading *g)
 static bool diagnose_parts(const struct grading *g, int set, const double *share,
                            struct mistake *out, struct err *e)
 {
+    bool right[RUBRIC_IMAGES];
+    for (int k = 0; k < RUBRIC_IMAGES; k++)
+        right[k] = true;
+    for (int i = 0; i < g->r->num_checks; i++)
+        for (int k = 0; k < g->r->check[i].num_images; k++)
+            right[g->r->check[i].images[k]] &= share[i] == 1;
     for (int p = 0; out->looked && p < g->r->num_parts; p++) {
         struct diagnosis *d = &out->of_part[p];
         bool lost = false;
         for (int i = 0; i < g->r->num_checks; i++)
             lost = lost || (g->r->check[i].part == p && share[i] < 1);
-        if (lost && !rubric_bugs_diagnose_part(g, set, p, d, e))
+        if (lost && !rubric_bugs_diagnose_part(g, set, p, right, d, e))
             return false;
         for (int i = 0; i < d->num_named; i++)
             if (carried_part_of(g->r, &g->bugs->catalogue.bug[d->candidate[i].bug]) != p)

@@ -274,8 +274,26 @@ static struct diagnose_options options_of(const struct grading *g)
         .alpha = g->alpha, .by_likelihood = true, .clip = isfinite(clip) ? clip : 0};
 }
 
-bool rubric_bugs_diagnose_part(const struct grading *g, int set, int part, struct diagnosis *found,
-                               struct err *e)
+/* Would the bug be seen in an image that is right? */
+static bool is_contradicted(const struct grading *g, int set, const struct candidate *bug,
+                            const bool *right, bool *out, struct err *e)
+{
+    const struct catalogue *c = &g->bugs->catalogue;
+    struct observation clue;
+    *out = false;
+    for (int i = 0; i < g->r->num_images && !*out; i++) {
+        /* Counts follow the noise of the program, and not the bug alone. */
+        if (!right[i] || rubric_sight_counts(g->r, i) || !rubric_bugs_can_observe(g, set, i))
+            continue;
+        if (!rubric_bugs_observe(g, set, i, &clue, e))
+            return false;
+        *out = diagnose_evidence(c, &clue, bug).log_lead < -diagnose_bound(c, g->alpha);
+    }
+    return true;
+}
+
+bool rubric_bugs_diagnose_part(const struct grading *g, int set, int part, const bool *right,
+                               struct diagnosis *found, struct err *e)
 {
     static const double black = 0.01; /* of the right image's mean */
     struct diagnose_options opt = options_of(g);
@@ -284,12 +302,18 @@ bool rubric_bugs_diagnose_part(const struct grading *g, int set, int part, struc
     if (seen == NULL)
         return err_set(e, "out of memory");
     opt.alpha /= g->r->num_parts;
-    int with;
+    int with = set;
     bool ok = likeliest_set(g, set, false, part, &opt, seen, found, &with, e);
     for (int k = 0; k < seen->num; k++)
         if (signature_mean(&seen->clue[k].seen) <
             black * signature_mean(&seen->clue[k].view->correct))
             *found = (struct diagnosis){0};
+    for (int k = 0; ok && k < found->num_named; k++) {
+        bool contradicted;
+        ok = is_contradicted(g, with, &found->candidate[k], right, &contradicted, e);
+        if (ok && contradicted)
+            found->num_named = 0;
+    }
     forget(seen);
     free(seen);
     return ok;

@@ -50,8 +50,9 @@ NODISCARD bool rubric_bugs_diagnose(const struct grading *g, int set, const char
 
 /* The same by the images that checks of one part have and none of an earlier part, and by a single bug: a
  * program with a mistake in each part is explained by no bug, and by no pair of them. Not FINDING_BUG where
- * no image of the part can be compared, and where one is black, for which there are many reasons. */
+ * no image of the part can be compared, and where one is black, for which there are many reasons. right, by
+ * image: no check of it lost anything; a bug that would be seen in such an image is not named. */
 NODISCARD bool rubric_bugs_diagnose_part(const struct grading *g, int set, int part,
-                                         struct diagnosis *found, struct err *e);
+                                         const bool *right, struct diagnosis *found, struct err *e);
 
 #endif

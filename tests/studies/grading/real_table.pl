@@ -32,12 +32,16 @@ for my $row (@rows) {
     my %lost = map { $_->{number} => $_->{of} - $_->{points} } grep { $_->{points} < $_->{of} - 1e-9 } @{ $g->{parts} };
     $parts{ $_->{number} } = $_->{of} for @{ $g->{parts} };
     my %own = map { $_ => 1 } @{ $row->{parts} };
-    my @found = map { [$_->{name}, ($_->{and} // ()) ] } @{ ($g->{diagnosis} // {})->{named} // [] };
-    my %names = map { $_ => 1 } map { @$_ } @found;
+    # What explains all images; else what explains those of a part.
+    my $diagnosis = $g->{diagnosis} // {};
+    my @told = @{ $diagnosis->{named} // [] } ? ($diagnosis->{named}) : map { $_->{named} } @{ $diagnosis->{parts} // [] };
+    my @found = map { [map { [$_->{name}, ($_->{and} // ())] } @$_] } grep { @$_ } @told;
+    my %names = map { $_ => 1 } map { @$_ } map { @$_ } @found;
     my @want = grep { $_ ne '-' } @{ $row->{names} };
     my $named = @want == @{ $row->{names} } && @want && !grep { !$names{$_} } @want;
     # Where several are told that no image tells apart, one of them has to be right.
-    my $wrong = @found && !grep { my $n = $_; !grep { my $k = $_; !grep { $_ eq $k } @want } @$n } @found;
+    my $right = sub { !grep { my $name = $_; !grep { $_ eq $name } @want } @{ $_[0] } };
+    my $wrong = grep { !grep { $right->($_) } @$_ } @found;
     my $only = %lost && !grep { !$own{$_} } keys %lost;
     my $all = !grep { !$lost{$_} } keys %own;
     my $c = $of{ $row->{kind} } //= {};
@@ -56,7 +60,7 @@ for my $row (@rows) {
     my ($commit) = ($g->{version} // '') =~ /commit (\w{8})/;
     push @lines, sprintf "| %s%s | %s | %s | %s | %s | %s | %s | %s | %.0f | %s |\n", $row->{id}, $row->{held} ? ' (held)' : '', $row->{what}, join(', ', @{ $row->{parts} }),
         join(', ', map { sprintf '%s: %.3g of %g', $_, $lost{$_}, $parts{$_} } sort keys %lost) || 'none', $as_it_is,
-        ($wrong ? '**wrong:** ' : '') . (join(' or ', map { join ' and ', @$_ } @found) || ($named ? '' : '')) . ($named ? ' (right)' : ''),
+        ($wrong ? '**wrong:** ' : '') . join('; ', map { join ' or ', map { join ' and ', @$_ } @$_ } @found) . ($named ? ' (right)' : ''),
         $g->{located} // '', $g->{provisional} ? 'yes' : '', $g->{cpu_s} // 0, $commit // '';
 }
 print "| program | what it is | part | points lost | as it is | named | located | provisional | CPU s | graded by |\n|---|---|---|---|---|---|---|---|--:|---|\n", @lines, "\n";
