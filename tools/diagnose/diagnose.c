@@ -177,8 +177,9 @@ static bool is_of_one_part(const struct bug *a, const struct bug *b)
     return n == strcspn(b->where, ",") && strncmp(a->where, b->where, n) == 0;
 }
 
-/* Does its effect stand out from its own noise in any view? Shared random numbers change an image by chance: the stored
- * effect is one realisation, and beside another bug it would explain any residual. */
+/* Does its effect stand out from its own noise in any view, or does it take another number of samples? Shared random
+ * numbers change an image by chance: the stored effect is one realisation, and beside another bug it would explain any
+ * residual. */
 static bool is_reproducible(const struct bug_fit *f, int bug)
 {
     static const double least = 10; /* mean square over variance; of such bugs it is 6 at most */
@@ -186,11 +187,16 @@ static bool is_reproducible(const struct bug_fit *f, int bug)
         const struct view *v = f->clue[k].view;
         const struct effect *e = v->effect[bug];
         const int values = 3 * v->correct.columns * v->correct.rows;
-        double sum = 0;
-        for (int i = 0; e != NULL && i < values; i++)
+        double sum = 0, samples;
+        if (e == NULL)
+            continue;
+        for (int i = 0; i < values; i++)
             if (e->mean[i] != 0)
                 sum += pow((double)e->mean[i], 2) / (double)e->var[i];
-        if (sum >= least * values)
+        samples = e->fact[FACT_SAMPLES] - v->correct.fact[FACT_SAMPLES];
+        if (sum >= least * values ||
+            pow(samples, 2) >= least * (pow(e->fact_sd[FACT_SAMPLES], 2) +
+                                        pow(v->correct.fact_sd[FACT_SAMPLES], 2)))
             return true;
     }
     return false;
