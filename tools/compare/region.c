@@ -9,7 +9,9 @@
 static const double skew_limit = 0.2;       /* skewness factor, in ln p, up to which a p is used as it is */
 static const double skew_limit_raised = 4;  /* the same where p is raised by it */
 static const double largest_gx = 0.3;       /* limit of |g| x there, as the next term has (g x)^2 */
-static const double skew_limit_widened = 1; /* the same where an interval is widened by it */
+static const double skew_limit_widened =
+    1; /* the same where the tail of an interval is lowered by it */
+static const double skew_limit_scaled = 32; /* the same where the interval is scaled by it, too */
 static const double least_dof = 0.2;        /* below, the end of an interval is beyond any double */
 static const double largest_t = 1e9;
 const double region_smallest_log10_p = -1e6;
@@ -342,11 +344,18 @@ double region_reach(const struct region *r)
     return fmax(fabs(r->ci_lo), fabs(r->ci_hi));
 }
 
-/* Half the width of the 1 - 2 alpha interval, in standard errors. */
-static bool half_width(const struct judge *j, const struct measured *m, double *x)
+/* Half the width of the 1 - 2 alpha interval, in standard errors. Beyond the factor e that a tail is lowered by, the
+ * expansion is no guide; the width is multiplied by the skewness factor instead (verdict.md: what this was found to
+ * cover). *scale: that factor, or 1. */
+static bool half_width(const struct judge *j, const struct measured *m, double *width,
+                       double *scale)
 {
-    return raised_quantile(m->skew, j->opt.alpha, fmax(least_dof, m->dof), skew_limit_widened, x) &&
-           m->dof >= least_dof;
+    double x;
+    *scale = 1;
+    if (!raised_quantile(m->skew, j->opt.alpha, fmax(least_dof, m->dof), skew_limit_widened, &x))
+        *scale = skew_factor(m->skew, x);
+    *width = x * *scale;
+    return *scale <= skew_limit_scaled && m->dof >= least_dof;
 }
 
 /* About how many times the samples would bring the skewness factor at x well within `limit`, to half of it, and |g| x within
@@ -387,15 +396,15 @@ struct region region_fill(const struct judge *j, const struct cell *cell, struct
         .ci_valid = true,
         .margin = m.margin,
     };
-    out.unskew_interval = out.unskew_test = 1;
+    out.ci_scale = out.unskew_interval = out.unskew_test = 1;
     if (!m.noise_free) {
-        double x;
-        out.ci_valid = half_width(j, &m, &x);
-        half += x * sqrt(m.v_margin);
+        double width;
+        out.ci_valid = half_width(j, &m, &width, &out.ci_scale);
+        half += width * sqrt(m.v_margin);
         /* The factor at the widened quantile, from which the search for it leaves. */
         if (!out.ci_valid)
             out.unskew_interval = samples_for(m.skew, stats_normal_quantile(j->opt.alpha * exp(-1)),
-                                              skew_limit_widened, INFINITY);
+                                              skew_limit_scaled, INFINITY);
         out.unskew_test =
             samples_for(m.skew, j->z_guard[m.statistic], skew_limit_raised, largest_gx);
     }

@@ -23,6 +23,17 @@ static void place(const struct comparison *c, const struct region *r, char *text
     region_name(c->z.width, c->z.height, rect, r->channel, text, size);
 }
 
+/* How many times the samples would bring half + spare to `limit`. Both fall as 1/sqrt n; so does `scale`, which is a
+ * factor of half, as long as it is above 1. */
+static double samples_to_reach(double limit, double half, double spare, double scale)
+{
+    const double unscaled = pow((half / scale + spare) / limit, 2);
+    if (unscaled >= scale * scale)
+        return unscaled;
+    /* half/n + spare/sqrt n = limit */
+    return pow((spare + sqrt(spare * spare + 4 * half * limit)) / (2 * limit), 2);
+}
+
 /* How many times the samples would bring this interval inside its margin: planned for equal engines
  * and a probability of 95 % over all intervals or, if there are enough samples for that, from the
  * difference seen. */
@@ -33,11 +44,11 @@ static double factor_needed(const struct region *r, size_t num_intervals)
                     r->unskew_interval); /* 4: few degrees of freedom may be in the way instead */
     double half = (r->ci_hi - r->ci_lo) / 2;
     double spare = stats_normal_quantile(0.025 / (double)num_intervals) * r->std_error;
-    double planned = pow((half + spare) / r->margin, 2);
+    double planned = samples_to_reach(r->margin, half, spare, r->ci_scale);
     if (planned > 1)
         return planned;
     double gap = fabs(fabs(r->difference) - r->margin);
-    return gap > 0 ? pow((half + spare) / gap, 2) : verdict_largest_factor;
+    return gap > 0 ? samples_to_reach(gap, half, spare, r->ci_scale) : verdict_largest_factor;
 }
 
 static void judge_equivalence(struct comparison *c, const struct region *tiles)
@@ -70,6 +81,12 @@ static void judge_equivalence(struct comparison *c, const struct region *tiles)
     if (!furthest->ci_valid)
         snprintf(c->reason, sizeof c->reason,
                  "%s: samples too skewed for an interval, more of them are needed", where);
+    else if (furthest->ci_scale > 1)
+        snprintf(c->reason, sizeof c->reason,
+                 "%s: interval %+.3g %% to %+.3g %%, %.2g times as wide as samples are skewed, is "
+                 "not inside the margin of %.3g %%",
+                 where, 100 * furthest->ci_lo, 100 * furthest->ci_hi, furthest->ci_scale,
+                 100 * furthest->margin);
     else
         snprintf(c->reason, sizeof c->reason,
                  "%s: interval %+.3g %% to %+.3g %% is not inside the margin of %.3g %%", where,

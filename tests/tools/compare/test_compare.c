@@ -37,7 +37,7 @@ TEST(test_by_hand)
     OWN(moments) a = new_moments(8, 8, "sample"), b = new_moments(8, 8, "replicate");
     set_all(&a, 101, 1.01, 10100, 0);
     set_all(&b, 101, 1, 30300, 0);
-    struct comparison c = compare(&a, &b, (struct compare_options){0.05, 0, 0, 4, 0, 1});
+    struct comparison c = compare(&a, &b, (struct compare_options){0.05, 0, 0, 4, 0, 1, false});
     for (int i = 0; i < 4; i++) {
         const struct region *r = &c.global[i];
         assert_true(r->x == 0 && r->y == 0 && r->width == 8 && r->height == 8 && r->channel == i);
@@ -79,7 +79,7 @@ TEST(test_by_hand)
     strcpy(b.unit, "exact");
     for (int i = 0; i < 3 * 32; i++)
         a.mean[i] += 0.3;
-    c = compare(&a, &b, (struct compare_options){0.05, 0, 0, 4, 0, 1});
+    c = compare(&a, &b, (struct compare_options){0.05, 0, 0, 4, 0, 1, false});
     assert_near(c.rms_bias, 0.3 * sqrt(0.5) / 2, 1e-12);
     comparison_free(&c);
 }
@@ -293,7 +293,7 @@ TEST(test_half_pixel_shift)
                 moments_add(&m[i], (size_t)p, (double[3]){value, value, value});
             }
     }
-    struct compare_options opt = {1e-3, 0, 0, 4, 0, 1};
+    struct compare_options opt = {1e-3, 0, 0, 4, 0, 1, false};
     assert_int_equal(verdict_of(&m[0], &m[1], opt), VERDICT_NOTHING_FOUND);
     OWN(comparison) c = compare(&m[2], &m[0], opt);
     assert_int_equal(c.verdict, VERDICT_DIFFERENT);
@@ -304,7 +304,7 @@ TEST(test_half_pixel_shift)
     /* Inside the margins of an approximate engine the same shift is no EQUIVALENT either: a tile on
      * an edge differs by 10 % or more. */
     assert_int_not_equal(
-        verdict_of(&m[2], &m[0], (struct compare_options){1e-3, 0.05, 0.06, 4, 0, 1}),
+        verdict_of(&m[2], &m[0], (struct compare_options){1e-3, 0.05, 0.06, 4, 0, 1, false}),
         VERDICT_EQUIVALENT);
     for (int i = 0; i < 3; i++)
         moments_free(&m[i]);
@@ -315,7 +315,8 @@ TEST(test_half_pixel_shift)
 TEST(test_noise_free)
 {
     OWN(moments) a = new_moments(8, 8, "sample"), b = new_moments(8, 8, "sample");
-    struct compare_options opt = {1e-3, 0, 0, 4, 0, 1}, margin = {1e-3, 0.01, 0.02, 4, 0, 1};
+    struct compare_options opt = {1e-3, 0, 0, 4, 0, 1, false},
+                           margin = {1e-3, 0.01, 0.02, 4, 0, 1, false};
     constant(&a, 15, 64);
     constant(&b, 15 * (1 + 3e-6), 64);
     assert_int_equal(verdict_of(&a, &b, opt), VERDICT_NOTHING_FOUND);
@@ -359,7 +360,8 @@ static double most_likely(double n, double m)
  * events may make up for it, and nothing is said; nor where samples differ, or inside the margin. */
 TEST(test_one_value_each)
 {
-    struct compare_options opt = {1e-6, 0, 0, 4, 0, 1}, margin = {1e-6, 0.01, 0.02, 4, 0, 1};
+    struct compare_options opt = {1e-6, 0, 0, 4, 0, 1, false},
+                           margin = {1e-6, 0.01, 0.02, 4, 0, 1, false};
     enum { SEEN, BLACK, EXACT, VARIED, INSIDE, FEW, CASES };
     for (int k = 0; k < CASES; k++) {
         OWN(moments) a = new_moments(8, 8, "sample"), b = new_moments(8, 8, "sample");
@@ -398,7 +400,7 @@ TEST(test_one_value_each)
 TEST(test_rounding_noise)
 {
     OWN(moments) a = new_moments(4, 4, "sample"), b = new_moments(4, 4, "sample");
-    struct compare_options opt = {1e-3, 0, 0, 2, 0, 1};
+    struct compare_options opt = {1e-3, 0, 0, 2, 0, 1, false};
     set_all(&a, 1000, 0.5, 1000 * 2.5e-17, 0);
     set_all(&b, 1000, 0.5 * (1 + 1e-7), 1000 * 2.5e-17, 0);
     assert_int_equal(verdict_of(&a, &b, opt), VERDICT_NOTHING_FOUND);
@@ -408,8 +410,8 @@ TEST(test_rounding_noise)
 
 /* Skewness: the same mean, variance and n, |g| = |k3|/V^1.5 of the image set by M3. 8 x 8 pixels,
  * n = 1000 against the exact value: V = 64 v, g = 64 k3/(64 v)^1.5 = k/8 with k = k3/v^1.5 the
- * skewness of a pixel's mean. k = 0.001: tested. k = 2: |g| = 0.25, at x > 3 a factor of e^2: neither
- * test nor interval, so INCONCLUSIVE although the means differ by 8 standard errors. */
+ * skewness of a pixel's mean. k = 0.001: tested. k = 2: |g| = 0.25, at x > 3 a factor of e^2: no test, and an
+ * interval at least twice as wide, so INCONCLUSIVE although the means differ by 8 standard errors. */
 TEST(test_skew_guard)
 {
     OWN(moments) a = new_moments(8, 8, "sample"), b = new_moments(8, 8, "exact");
@@ -420,7 +422,8 @@ TEST(test_skew_guard)
         for (int skewed = 0; skewed < 2; skewed++) {
             double k3 = (skewed ? 2 : 0.001) * v * sqrt(v);
             set_all(&a, n, 1.01, m2, k3 * n * (n - 1) * (n - 2));
-            struct compare_options opt = {1e-3, margin ? 0.001 : 0, margin ? 0.002 : 0, 4, 0, 1};
+            struct compare_options opt = {1e-3, margin ? 0.001 : 0, margin ? 0.002 : 0, 4, 0, 1,
+                                          false};
             OWN(comparison) c = compare(&a, &b, opt);
             assert_true(c.skew_limited == (skewed == 1));
             if (skewed) {
@@ -429,7 +432,7 @@ TEST(test_skew_guard)
                 assert_non_null(strstr(c.reason, "skewed"));
                 assert_true(c.extra_factor > 1);
                 assert_true(c.mdb_global == 1e6 && c.mdb_tile == 1e6);
-                assert_false(c.global[3].ci_valid);
+                assert_true(c.global[3].ci_valid && c.global[3].ci_scale > 2);
             } else {
                 assert_int_equal(c.verdict, VERDICT_DIFFERENT);
             }
@@ -452,7 +455,7 @@ TEST(test_harmless_by_luck)
             a.mean[3 * 100 + c] = 1 - 8 * sqrt(v);
             a.m3[3 * 100 + c] = 0.01 * v * sqrt(v) * scale;
         }
-        OWN(comparison) c = compare(&a, &b, (struct compare_options){1e-3, 0, 0, 8, 0, 1});
+        OWN(comparison) c = compare(&a, &b, (struct compare_options){1e-3, 0, 0, 8, 0, 1, false});
         assert_int_equal(c.verdict, lucky ? VERDICT_NOTHING_FOUND : VERDICT_DIFFERENT);
         assert_true(lucky || (c.worst.width == 1 &&
                               c.worst.log10_p > log10(2) + log10(gsl_cdf_ugaussian_Q(8))));
@@ -505,17 +508,31 @@ TEST(test_all_alike_by_luck)
     assert_int_equal(alarms, 0);
 }
 
-/* The image's |g| is 0.156: 64 pixels of k3 = 1.25 v^1.5. With x = 3.375, the quantile of 1e-3/e, the factor g x^3/3 is 2.
- * It falls as 1/sqrt n: with 16 times the samples it is 1/2, half of what an interval may be widened by. */
+/* The image's |g| is 0.156: 64 pixels of k3 = 1.25 v^1.5. The variance of v is k3^2/v at least, so that there are
+ * 2 x 64/1.25^2 = 82 degrees of freedom. x = 3.5 is their quantile of 1e-3/e, the factor f = g x^3/3 is 2.24, and
+ * half of the interval is f x SE, SE = 1.25e-4: 9.8e-4. Within 0.11 %, and not within 0.05 %. Both factors fall as
+ * 1/sqrt n until f is 1, and equal engines need z = 2.58 (1 in 40 over 5 intervals) SE more, 3.2e-4: of c times as
+ * many samples 9.8e-4/c + 3.2e-4/sqrt c = 5e-4, so c = 3.1. Then 32 times as skewed: f at the normal x of 3.375 is
+ * 64, beyond any interval, so 4 (64/32)^2 times the samples. */
 TEST(test_samples_that_skewness_needs)
 {
     OWN(moments) a = new_moments(8, 8, "sample"), b = new_moments(8, 8, "exact");
-    const double n = 1000, v = 1e-6;
+    const double n = 1000, v = 1e-6, m3 = 1.25 * v * sqrt(v) * n * (n - 1) * (n - 2);
     constant(&b, 1, 1);
-    set_all(&a, n, 1, v * n * (n - 1), 1.25 * v * sqrt(v) * n * (n - 1) * (n - 2));
-    OWN(comparison) c = compare(&a, &b, (struct compare_options){1e-3, 0.01, 0.02, 8, 0, 1});
+    set_all(&a, n, 1, v * n * (n - 1), m3);
+    OWN(comparison)
+    wide = compare(&a, &b, (struct compare_options){1e-3, 1.1e-3, 1.1e-3, 8, 0, 1, false});
+    assert_int_equal(wide.verdict, VERDICT_EQUIVALENT);
+    assert_near(wide.global[3].ci_hi, 9.8e-4, 2e-5);
+    OWN(comparison) c = compare(&a, &b, (struct compare_options){1e-3, 5e-4, 5e-4, 8, 0, 1, false});
     assert_int_equal(c.verdict, VERDICT_INCONCLUSIVE);
-    assert_near(c.extra_factor, 16, 0.2);
+    assert_non_null(strstr(c.reason, "2.2 times as wide as samples are skewed"));
+    assert_near(c.extra_factor, 3.1, 0.1);
+    set_all(&a, n, 1, v * n * (n - 1), 32 * m3);
+    OWN(comparison)
+    none = compare(&a, &b, (struct compare_options){1e-3, 0.01, 0.02, 8, 0, 1, false});
+    assert_int_equal(none.verdict, VERDICT_INCONCLUSIVE);
+    assert_near(none.extra_factor, 16, 0.2);
 }
 
 /* A lamp in view, 1000 in 16 of 1024 pixels, and walls of 0.1, 30 % too bright in A. In units of 5 % of the mean, 0.79,
@@ -531,7 +548,8 @@ TEST(test_lamp_in_view)
             size_t at = (size_t)(i / (3 * side) * 3 * 32 + i % (3 * side));
             a.mean[at] = b.mean[at] = 1000;
         }
-        enum verdict v = verdict_of(&a, &b, (struct compare_options){1e-3, 0.02, 0.08, 8, 0, 1});
+        enum verdict v =
+            verdict_of(&a, &b, (struct compare_options){1e-3, 0.02, 0.08, 8, 0, 1, false});
         assert_int_equal(v, side == 4 ? VERDICT_DIFFERENT : VERDICT_EQUIVALENT);
     }
 }
@@ -550,7 +568,8 @@ TEST(test_black_background)
         }
         for (int i = 0; i < 3 * 8 * 8; i++)
             a.mean[(24 + i / (3 * 8)) * 3 * 32 + 3 * 24 + i % (3 * 8)] = 1e-5 * times;
-        enum verdict v = verdict_of(&a, &b, (struct compare_options){1e-3, 0.02, 0.08, 8, 0, 1});
+        enum verdict v =
+            verdict_of(&a, &b, (struct compare_options){1e-3, 0.02, 0.08, 8, 0, 1, false});
         assert_int_equal(v, times == 1 ? VERDICT_EQUIVALENT : VERDICT_DIFFERENT);
     }
 }
@@ -564,7 +583,7 @@ TEST(test_skewed_tile)
     double m2 = v * n * (n - 1);
     constant(&b, 1, 1);
     set_all(&a, n, 1, m2, 0);
-    struct compare_options opt = {1e-3, 0.01, 0.02, 4, 0, 1};
+    struct compare_options opt = {1e-3, 0.01, 0.02, 4, 0, 1, false};
     OWN(comparison) plain = compare(&a, &b, opt);
     for (int y = 0; y < 4; y++)
         for (int x = 0; x < 4; x++)
@@ -600,11 +619,11 @@ TEST(test_floor)
             a.mean[3 * p + c] = 0.0004;
             b.mean[3 * p + c] = 0;
         }
-    OWN(comparison) c = compare(&a, &b, (struct compare_options){1e-3, 0.04, 0.04, 4, 0, 1});
+    OWN(comparison) c = compare(&a, &b, (struct compare_options){1e-3, 0.04, 0.04, 4, 0, 1, false});
     assert_near(c.worst_tile.difference, 0.032, 1e-12);
     assert_near(c.relative.data[0], 0.032, 1e-7);
     assert_int_equal(c.verdict, VERDICT_EQUIVALENT);
-    assert_int_equal(verdict_of(&a, &b, (struct compare_options){1e-3, 0.03, 0.03, 4, 0, 1}),
+    assert_int_equal(verdict_of(&a, &b, (struct compare_options){1e-3, 0.03, 0.03, 4, 0, 1, false}),
                      VERDICT_DIFFERENT);
 }
 
@@ -621,7 +640,8 @@ TEST(test_margin_between)
         for (int p = 0; p < 256; p++)
             for (int c = 0; p % 16 < 8 && p / 16 < 8 && c < 3; c++)
                 a.mean[3 * p + c] = over ? 1.021 : 1.019;
-        OWN(comparison) c = compare(&a, &b, (struct compare_options){1e-3, 0.01, 0.03, 4, 0, 1});
+        OWN(comparison)
+        c = compare(&a, &b, (struct compare_options){1e-3, 0.01, 0.03, 4, 0, 1, false});
         assert_int_equal(c.verdict, over ? VERDICT_DIFFERENT : VERDICT_EQUIVALENT);
         if (over) {
             assert_near(c.worst.margin, 0.02, 1e-12);
@@ -636,7 +656,7 @@ TEST(test_margin_between)
 TEST(test_extra_factor)
 {
     OWN(moments) a = new_moments(16, 16, "sample"), b = new_moments(16, 16, "sample");
-    struct compare_options opt = {1e-3, 0.02, 0.1, 8, 0, 1};
+    struct compare_options opt = {1e-3, 0.02, 0.1, 8, 0, 1, false};
     uint64_t seed = 21;
     simulate_pair(&a, &b, LAW_NORMAL, 8, true, &seed);
     OWN(comparison) c = compare(&a, &b, opt);
@@ -668,7 +688,7 @@ TEST(test_nothing_found)
     for (int i = 0; i < 3 * 32 * 32; i++)
         if (i / 3 % 32 < 16 && i / 3 / 32 < 16)
             a.mean[i] = 0.7;
-    OWN(comparison) c = compare(&a, &b, (struct compare_options){1e-6, 0, 0, 16, 0, 1});
+    OWN(comparison) c = compare(&a, &b, (struct compare_options){1e-6, 0, 0, 16, 0, 1, false});
     assert_int_equal(c.verdict, VERDICT_NOTHING_FOUND);
     assert_true(c.mdb_tile > 0.3 && c.mdb_tile < 8.3 * 0.088);
     char image[32], tile[32], wanted[256];
@@ -676,7 +696,7 @@ TEST(test_nothing_found)
              region_mdb_text(c.mdb_global, image), region_mdb_text(c.mdb_tile, tile));
     assert_non_null(strstr(c.reason, wanted));
     /* 1 % of the image needs (3.1 0.044/0.01)^2 = 190 times the samples: more than is said in numbers. */
-    OWN(comparison) d = compare(&a, &b, (struct compare_options){1e-3, 0.01, 0.9, 16, 0, 1});
+    OWN(comparison) d = compare(&a, &b, (struct compare_options){1e-3, 0.01, 0.9, 16, 0, 1, false});
     assert_int_equal(d.verdict, VERDICT_INCONCLUSIVE);
     assert_true(d.extra_factor == 100);
     char more[128];
@@ -717,7 +737,7 @@ TEST(test_margin_of_variance)
             constant(&b, 1, 1);
             strcpy(b.unit, "exact");
         }
-        const struct compare_options opt = {1e-3, 0.1, 0.4, 16, cases[i].margin, 1};
+        const struct compare_options opt = {1e-3, 0.1, 0.4, 16, cases[i].margin, 1, false};
         OWN(comparison) c = compare(&a, &b, opt);
         print_message("%s: %s\n", verdict_name(c.verdict), c.reason);
         assert_int_equal(c.verdict, cases[i].verdict);
@@ -735,7 +755,7 @@ TEST(test_channels)
         a.mean[3 * p] = 1 + 0.1 / 0.2126;
         a.mean[3 * p + 1] = 1 - 0.1 / 0.7152;
     }
-    OWN(comparison) c = compare(&a, &b, (struct compare_options){1e-3, 0.01, 0.02, 4, 0, 1});
+    OWN(comparison) c = compare(&a, &b, (struct compare_options){1e-3, 0.01, 0.02, 4, 0, 1, false});
     assert_near(c.global[3].difference, 0, 1e-12);
     assert_int_equal(c.verdict, VERDICT_DIFFERENT);
     assert_true(c.worst.channel < 3);
@@ -752,7 +772,7 @@ TEST(test_below_zero)
     for (int i = 0; i < 3 * 64; i += 3 * 8)
         for (int c = 0; c < 3; c++)
             a.mean[i + c] = b.mean[i + c] = -0.1;
-    const struct compare_options opt = {1e-3, 0.001, 0.004, 8, 0, 1};
+    const struct compare_options opt = {1e-3, 0.001, 0.004, 8, 0, 1, false};
     OWN(comparison) same = compare(&a, &b, opt);
     assert_int_equal(same.verdict, VERDICT_EQUIVALENT);
     assert_near(same.global[3].difference, 0, 1e-12);
@@ -781,7 +801,7 @@ static void expect(const struct moments *b, struct compare_options opt, const ch
 /* Each fault on its own, in B: refused with its own line. Control: without it, judged. */
 TEST(test_hygiene)
 {
-    const struct compare_options right = {1e-3, 0.01, 0.02, 2, 0, 1};
+    const struct compare_options right = {1e-3, 0.01, 0.02, 2, 0, 1, false};
     struct compare_options opt = right;
     OWN(moments) b = new_moments(4, 4, "replicate"), tall = new_moments(4, 8, "replicate");
     const struct {
