@@ -345,16 +345,16 @@ double region_reach(const struct region *r)
 }
 
 /* Half the width of the 1 - 2 alpha interval, in standard errors. Beyond the factor e that a tail is lowered by, the
- * expansion is no guide; the width is multiplied by the skewness factor instead (verdict.md: what this was found to
- * cover). *scale: that factor, or 1. */
+ * expansion is no guide; the width is multiplied by the skewness factor at the normal quantile instead (verdict.md: what
+ * that was found to cover). *scale: that factor, or 1. */
 static bool half_width(const struct judge *j, const struct measured *m, double *width,
                        double *scale)
 {
-    double x;
+    const double alpha = j->opt.alpha;
     *scale = 1;
-    if (!raised_quantile(m->skew, j->opt.alpha, fmax(least_dof, m->dof), skew_limit_widened, &x))
-        *scale = skew_factor(m->skew, x);
-    *width = x * *scale;
+    if (!raised_quantile(m->skew, alpha, fmax(least_dof, m->dof), skew_limit_widened, width))
+        *scale = fmax(1, skew_factor(m->skew, stats_normal_quantile(alpha * exp(-1))));
+    *width *= *scale;
     return *scale <= skew_limit_scaled && m->dof >= least_dof;
 }
 
@@ -401,7 +401,6 @@ struct region region_fill(const struct judge *j, const struct cell *cell, struct
         double width;
         out.ci_valid = half_width(j, &m, &width, &out.ci_scale);
         half += width * sqrt(m.v_margin);
-        /* The factor at the widened quantile, from which the search for it leaves. */
         if (!out.ci_valid)
             out.unskew_interval = samples_for(m.skew, stats_normal_quantile(j->opt.alpha * exp(-1)),
                                               skew_limit_scaled, INFINITY);

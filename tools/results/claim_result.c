@@ -166,7 +166,7 @@ static const struct shape judged_shape = {
          [IS_NUMBER] =
              "alpha margin_global margin_tile margin_variance? difference log10_p mdb_global mdb_tile rms_bias extra_factor noise_share_a? n_a? n_b? spp_b? seconds_a? seconds_b?",
          [IS_COUNT] = "tile num_tests tiles_x tiles_y seed_a?",
-         [IS_BOOLEAN] = "skew_limited same_bits?",
+         [IS_BOOLEAN] = "skew_limited same_bits? paired?",
          [IS_INTERVAL] = "ci accept_mdb?",
          [IS_TRIPLE] = "channel_difference",
          [IS_COUNTS] = "seeds_b?"},

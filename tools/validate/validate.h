@@ -27,7 +27,8 @@ struct validate_options {
     int engine_spp, engine_replicates; /* 0: as its description says */
     bool
         repeats_seeds; /* the engine is rendered with the seeds of each stored reference first, and is EQUIVALENT
-                           to it if that makes the same bits; where not, with reference_seed */
+                           to it if that makes the same bits; where not, images of one seed are compared in
+                           pairs; what these leave undecided is rendered with reference_seed */
     int threads;
     double timeout_s; /* of one program */
     bool quiet;
