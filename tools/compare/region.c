@@ -345,17 +345,21 @@ double region_reach(const struct region *r)
 }
 
 /* Half the width of the 1 - 2 alpha interval, in standard errors. Beyond the factor e that a tail is lowered by, the
- * expansion is no guide; the width is multiplied by the skewness factor at the normal quantile instead (verdict.md: what
- * that was found to cover). *scale: that factor, or 1. */
+ * expansion is no guide; the normal quantile is multiplied by the skewness factor f^(5/4) instead (verdict.md: what that
+ * was found to cover). *scale: how many times as wide that is, or 1. */
 static bool half_width(const struct judge *j, const struct measured *m, double *width,
                        double *scale)
 {
     const double alpha = j->opt.alpha;
+    double factor = 0;
     *scale = 1;
-    if (!raised_quantile(m->skew, alpha, fmax(least_dof, m->dof), skew_limit_widened, width))
-        *scale = fmax(1, skew_factor(m->skew, stats_normal_quantile(alpha * exp(-1))));
+    if (!raised_quantile(m->skew, alpha, fmax(least_dof, m->dof), skew_limit_widened, width)) {
+        const double z = stats_normal_quantile(alpha * exp(-1));
+        factor = skew_factor(m->skew, z);
+        *scale = fmax(1, z * pow(factor, 1.25) / *width);
+    }
     *width *= *scale;
-    return *scale <= skew_limit_scaled && m->dof >= least_dof;
+    return factor <= skew_limit_scaled && m->dof >= least_dof;
 }
 
 /* About how many times the samples would bring the skewness factor at x well within `limit`, to half of it, and |g| x within
