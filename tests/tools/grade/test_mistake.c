@@ -373,6 +373,36 @@ TEST(a_part_is_named_by_itself)
     }
 }
 
+/* Where shadow rays are not traced, Part 2's shadows are missing, too. If those are there, what Part 3's images look like is
+ * no such bug; asked of nothing else, Part 3 alone has its name. */
+TEST(a_right_image_denies_a_name)
+{
+    const int bug = bug_images_number(&of, "light_without_shadow"), part = 2;
+    struct submitted_images *h = bug_images_hand_in(&of, 0, bug, -1, 1),
+                            *other = bug_images_hand_in(&of, 0, -1, -1, 1);
+    bool none[RUBRIC_IMAGES] = {false}, is_right[RUBRIC_IMAGES] = {false};
+    assert_string_equal(of.rubric->part[part].number, "3");
+    for (int i = of.rubric->num_checks - 1; i >= 0; i--)
+        for (int k = 0; k < of.rubric->check[i].num_images; k++)
+            is_right[of.rubric->check[i].images[k]] = of.rubric->check[i].part != part;
+    for (int i = 0; i < of.rubric->num_images; i++)
+        if (is_right[i]) {
+            const struct submitted_image was = h->image[i];
+            h->image[i] = other->image[i];
+            other->image[i] = was;
+        }
+    const struct grading g = {of.rubric, of.answers, h, 1e-5, &of.bugs};
+    for (int asked = 0; asked < 2; asked++) {
+        struct diagnosis d;
+        struct err e;
+        MUST(rubric_bugs_diagnose_part(&g, 0, part, asked ? is_right : none, &d, &e));
+        assert_int_equal(d.num_named, asked ? 0 : 1);
+        assert_true(asked || d.candidate[0].bug == bug);
+    }
+    bug_images_take_back(&of, h);
+    bug_images_take_back(&of, other);
+}
+
 TEST(one_image_for_all_is_not_carried_on)
 {
     const int like[] = {-1, -1, -1, image_number("corner")}, level[] = {0, 120, 240, 0};
