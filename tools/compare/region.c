@@ -346,20 +346,18 @@ double region_reach(const struct region *r)
 
 /* Half the width of the 1 - 2 alpha interval, in standard errors. Beyond the factor e that a tail is lowered by, the
  * expansion is no guide; the normal quantile is multiplied by the skewness factor f^(5/4) instead (verdict.md: what that
- * was found to cover). *scale: how many times as wide that is, or 1. */
+ * was found to cover), unless skewness is but pooled. *scale: how many times as wide that is, or 1. */
 static bool half_width(const struct judge *j, const struct measured *m, double *width,
                        double *scale)
 {
-    const double alpha = j->opt.alpha;
-    double factor = 0;
+    const double alpha = j->opt.alpha, z = stats_normal_quantile(alpha * exp(-1)),
+                 factor = skew_factor(m->skew, z);
     *scale = 1;
-    if (!raised_quantile(m->skew, alpha, fmax(least_dof, m->dof), skew_limit_widened, width)) {
-        const double z = stats_normal_quantile(alpha * exp(-1));
-        factor = skew_factor(m->skew, z);
-        *scale = fmax(1, z * pow(factor, 1.25) / *width);
-    }
+    if (raised_quantile(m->skew, alpha, fmax(least_dof, m->dof), skew_limit_widened, width))
+        return m->dof >= least_dof;
+    *scale = fmax(1, z * pow(factor, 1.25) / *width);
     *width *= *scale;
-    return factor <= skew_limit_scaled && m->dof >= least_dof;
+    return !j->is_pooled && factor <= skew_limit_scaled && m->dof >= least_dof;
 }
 
 /* About how many times the samples would bring the skewness factor at x well within `limit`, to half of it, and |g| x within
@@ -406,8 +404,9 @@ struct region region_fill(const struct judge *j, const struct cell *cell, struct
         out.ci_valid = half_width(j, &m, &width, &out.ci_scale);
         half += width * sqrt(m.v_margin);
         if (!out.ci_valid)
-            out.unskew_interval = samples_for(m.skew, stats_normal_quantile(j->opt.alpha * exp(-1)),
-                                              skew_limit_scaled, INFINITY);
+            out.unskew_interval =
+                samples_for(m.skew, stats_normal_quantile(j->opt.alpha * exp(-1)),
+                            j->is_pooled ? skew_limit_widened : skew_limit_scaled, INFINITY);
         out.unskew_test =
             samples_for(m.skew, j->z_guard[m.statistic], skew_limit_raised, largest_gx);
     }
