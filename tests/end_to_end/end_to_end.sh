@@ -262,6 +262,18 @@ expect "compare: one seed, the interval" 0 "^difference +0.100 % \[+0.0[89].*, +
 expect "compare: one seed, not paired" 3 "paired judges them" "$san_assay" compare --margin 0.05 "$tmp/two.exr" "$tmp/two.exr"
 expect "compare: one seed, nothing changed" 0 "the same to the bit" \
     "$san_assay" compare --paired --margin 0.05 "$tmp/two.exr" "$tmp/two.exr"
+# Folders: 8 renders of one seed each.
+for folder in dark brighter; do
+    mkdir "$tmp/pairs_$folder"
+    for seed in 1 2 3 4 5 6 7 8; do
+        "$pathtracer" -q -r 32 32 -s 16 --seed $seed -f "$tmp/pairs_$folder/$seed.exr" "$([ $folder = dark ] && echo $scene || echo "$tmp/brighter.dae")" >/dev/null
+    done
+done
+expect "compare: folders, paired" 0 "^difference +0.100 % \[+0.09.*, +0.1[01]" \
+    "$san_assay" compare --paired --margin 0.05 "$tmp/pairs_brighter" "$tmp/pairs_dark"
+mv "$tmp/pairs_dark/8.exr" "$tmp/pairs_dark/9.exr"
+expect "compare: folders, not of one seed" 3 "need the same name" \
+    "$san_assay" compare --paired --margin 0.05 "$tmp/pairs_brighter" "$tmp/pairs_dark"
 expect "compare: paired and exchangeable" 3 "cannot be exchanged" \
     "$san_assay" compare --paired --exchangeable "$tmp/two.exr" "$tmp/two.exr"
 # Without a margin nothing is equal; the last line has what makes it pass.

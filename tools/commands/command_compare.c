@@ -70,7 +70,8 @@ static const struct cli_option options[] = {
      TO(job.again)},
     {0, "paired", "",
      "A and B have correlated noise (same seed, two versions of a\n"
-     "program): estimate it from A - B, which shows smaller differences",
+     "program): estimate it from A - B, which shows smaller differences;\n"
+     "of two folders, each render is compared with that of its name",
      TO(job.paired)},
     {0, "exchangeable", "",
      "exact permutation test: A and B are directories of replicates of\n"

@@ -85,7 +85,8 @@ bool replicate_dir_read(const char *dir, struct replicate_dir *out, struct err *
 void replicate_dir_free(struct replicate_dir *r)
 {
     for (int k = 0; k < r->num; k++) {
-        free(r->name[k]);
+        if (r->name != NULL)
+            free(r->name[k]);
         if (r->rgb != NULL)
             free(r->rgb[k]);
     }

@@ -45,9 +45,8 @@ static bool check_pairs(const char *path, const struct replicate_dir *from,
                    pair ? t.pair_r : t.neighbours_r);
 }
 
-/* Fills sharing and unlimited from the renders. */
-static bool measure_sharing(const char *path, const struct replicate_dir *from, struct input *out,
-                            struct err *e)
+bool input_measure_sharing(const char *path, const struct replicate_dir *from, struct input *out,
+                           struct err *e)
 {
     struct replicates r;
     struct shared_noise s;
@@ -62,7 +61,7 @@ static bool measure_sharing(const char *path, const struct replicate_dir *from, 
         r.sharing = out->sharing = shared_noise_factor(&s, sharing_alpha, &unlimited);
         if (unlimited != NULL)
             out->unlimited = *unlimited;
-        else
+        else if (path != NULL)
             ok = check_pairs(path, from, &r, &s, e);
     }
     replicates_free(&r);
@@ -79,7 +78,7 @@ static bool take_replicates(const char *path, char side, const struct replicate_
     if (spp > 0 && r->spp > 0)
         return err_set(e, "%s: --spp-%c: its renders say themselves how many samples they have",
                        path, side);
-    if (!measure_sharing(path, r, out, e) || !replicate_dir_moments(r, &out->m, e))
+    if (!input_measure_sharing(path, r, out, e) || !replicate_dir_moments(r, &out->m, e))
         return false;
     if (spp > 0)
         out->m.spp = spp;

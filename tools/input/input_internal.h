@@ -8,6 +8,11 @@
 /* Adds a note if the file stores a rectangle other than the whole image. */
 void input_note_crop(struct notes *notes, const char *path, const struct image_info *info);
 
+/* Fills sharing and unlimited from renders. path: refuses renders that share noise with each other, in a line that
+ * begins with it; NULL: does not look (input.c). */
+NODISCARD bool input_measure_sharing(const char *path, const struct replicate_dir *from,
+                                     struct input *out, struct err *e);
+
 /* Mitsuba 3 (input_mitsuba.c). *is_it: whether the file is one of Mitsuba's at all; if not, returns
  * true and leaves `out` as it is. `im`: the file's content. */
 NODISCARD bool input_mitsuba(const char *path, char side, const struct image *im,

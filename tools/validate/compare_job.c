@@ -5,6 +5,7 @@
 #include "tools/compare/hint.h"
 #include "tools/compare/variance_ratio.h"
 #include "tools/compare/verdict.h"
+#include "tools/input/input_pairs.h"
 #include "tools/report/report.h"
 #include "tools/results/claim_result.h"
 #include "tools/sequential/two_stage.h"
@@ -17,6 +18,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 bool compare_job_check(struct compare_job *job, struct err *e)
 {
@@ -57,6 +59,7 @@ bool compare_job_check(struct compare_job *job, struct err *e)
 /* Two sides as compare_moments() wants them. */
 struct pair {
     struct input in[2];
+    bool is_of_renders; /* each with the other side's of its seed */
 };
 
 static void pair_free(struct pair *p)
@@ -65,26 +68,46 @@ static void pair_free(struct pair *p)
     input_free(&p->in[1]);
 }
 
-/* For sides that share their noise: drops their stated variances, which are not that of A - B; input_pair() then
- * estimates it from A - B itself. */
-static void make_pairs(struct pair *p, struct notes *notes)
+/* Reads a directory of replicates, or borrows those in memory. */
+static bool renders_read(const char *path, const struct input_memory *memory,
+                         struct replicate_dir *out, struct err *e)
 {
-    struct moments *m[2] = {&p->in[0].m, &p->in[1].m};
-    size_t values = 3 * (size_t)m[0]->width * (size_t)m[0]->height;
-    bool same = m[0]->width == m[1]->width && m[0]->height == m[1]->height &&
-                memcmp(m[0]->mean, m[1]->mean, values * sizeof *m[0]->mean) == 0;
-    for (int i = 0; i < 2; i++) {
-        p->in[i].kind = same ? INPUT_MOMENTS : INPUT_IMAGE;
-        p->in[i].is_guessed = true;
-        for (size_t k = 0; same && k < values; k++) {
-            m[i]->n[k / 3] = 1;
-            m[i]->m2[k] = m[i]->m3[k] = 0;
-        }
-        if (same)
-            strcpy(m[i]->unit, "exact");
-    }
-    input_notes_add(notes, same ? "--paired: both images are the same to the bit"
-                                : "--paired: the noise is that of A - B, whatever the sides state");
+    if (memory == NULL)
+        return replicate_dir_read(path, out, e);
+    if (memory->moments != NULL || memory->renders.num < 3 || memory->type != IMAGE_FLOAT)
+        return err_set(e, "%s: replicates are needed, at least 3 images of floats", path);
+    *out = memory->renders;
+    return true;
+}
+
+static void renders_free(const struct input_memory *memory, struct replicate_dir *r)
+{
+    if (memory == NULL)
+        replicate_dir_free(r);
+}
+
+static bool is_of_renders(const char *path, const struct input_memory *memory)
+{
+    struct stat st;
+    return memory != NULL ? memory->moments == NULL && memory->renders.num > 1
+                          : stat(path, &st) == 0 && S_ISDIR(st.st_mode);
+}
+
+/* Of one seed each in A and B. */
+static bool read_pairs_of_renders(const struct compare_job *job, const char *const path[2],
+                                  const struct input_memory *const memory[2], struct pair *p,
+                                  struct notes *notes, struct err *e)
+{
+    struct replicate_dir r[2] = {{0}};
+    if (job->input[0].curve != NULL || job->input[0].spp > 0 || job->input[1].spp > 0)
+        return err_set(e, "--paired of directories of renders: --curve and --spp-a do not apply");
+    const bool ok = renders_read(path[0], memory[0], &r[0], e) &&
+                    renders_read(path[1], memory[1], &r[1], e) &&
+                    input_pairs_of_renders(path, r, p->in, notes, e);
+    renders_free(memory[0], &r[0]);
+    renders_free(memory[1], &r[1]);
+    p->is_of_renders = ok;
+    return ok;
 }
 
 /* What the threads that read the two sides share. */
@@ -114,12 +137,11 @@ static void read_sides(void *ctx, size_t first, size_t last)
     }
 }
 
-static bool pair_read(const struct compare_job *job, const char *const path[2],
-                      const struct input_memory *const memory[2], struct pair *p,
-                      struct notes *notes, struct err *e)
+static bool read_two_sides(const struct compare_job *job, const char *const path[2],
+                           const struct input_memory *const memory[2], struct pair *p,
+                           struct notes *notes, struct err *e)
 {
     struct reading r = {.job = job, .path = path, .memory = memory, .pair = p};
-    *p = (struct pair){0};
     parallel_for(job->opt.threads, 2, read_sides, &r);
     bool ok = true;
     for (int i = 0; ok && i < 2; i++) {
@@ -133,7 +155,18 @@ static bool pair_read(const struct compare_job *job, const char *const path[2],
              err_set(e, "--curve is for images of integers, neither %s nor %s is one", path[0],
                      path[1]);
     if (ok && job->paired)
-        make_pairs(p, notes);
+        input_pairs_of_images(p->in, notes);
+    return ok;
+}
+
+static bool pair_read(const struct compare_job *job, const char *const path[2],
+                      const struct input_memory *const memory[2], struct pair *p,
+                      struct notes *notes, struct err *e)
+{
+    *p = (struct pair){0};
+    bool ok = job->paired && is_of_renders(path[0], memory[0]) && is_of_renders(path[1], memory[1])
+                  ? read_pairs_of_renders(job, path, memory, p, notes, e)
+                  : read_two_sides(job, path, memory, p, notes, e);
     const bool independent = job->filter_width == 1;
     ok = ok && input_pair(&p->in[0], &p->in[1], independent, notes, e) &&
          (!independent || job->same_program || p->in[0].is_guessed ||
@@ -196,11 +229,12 @@ static bool run_moments(const struct compare_job *job, struct compared *out, str
     struct compare_options opt = job->opt;
     if (!pair_read(job, job->path, job->memory, &p, &out->notes, e))
         return false;
+    opt.is_paired = p.is_of_renders;
     bool two = job->again[0] != NULL;
     /* Noise that was taken from A - B says nothing of itself, and what pixels share is in the variances. */
     double seen = variance_ratio_of_difference(&p.in[0].m, &p.in[1].m) *
                   fmax(1, fmax(p.in[0].sharing, p.in[1].sharing));
-    if (seen < 1 && !p.in[0].is_guessed)
+    if (seen < 1 && !p.in[0].is_guessed && !p.is_of_renders)
         input_notes_add(&out->notes,
                         "the sides are not independent, or state too much noise: A - B is %.2g of "
                         "what they state (root mean square). Same seeds? --paired judges them as "
@@ -229,24 +263,6 @@ static bool same_image(const struct replicate_dir *r, const struct replicate_dir
     return !replicate_dir_share(r, s, &i, &j) ||
            err_set(e, "%s: %s is also in the first render: a second stage needs fresh seeds", dir,
                    s->name != NULL ? s->name[j] : "one of it");
-}
-
-/* Reads a directory of replicates, or borrows those in memory. */
-static bool renders_read(const char *path, const struct input_memory *memory,
-                         struct replicate_dir *out, struct err *e)
-{
-    if (memory == NULL)
-        return replicate_dir_read(path, out, e);
-    if (memory->moments != NULL || memory->renders.num < 3 || memory->type != IMAGE_FLOAT)
-        return err_set(e, "%s: a permutation needs replicates, at least 3 images of floats", path);
-    *out = memory->renders;
-    return true;
-}
-
-static void renders_free(const struct input_memory *memory, struct replicate_dir *r)
-{
-    if (memory == NULL)
-        replicate_dir_free(r);
 }
 
 static bool permute_again(const struct compare_job *job, const struct replicate_dir first[2],

@@ -6,7 +6,7 @@
 #include "renderer/image/image_oiio.h"
 #include "renderer/base/fs.h"
 #include "tools/images/tone_curve.h"
-#include "tools/input/input.h"
+#include "tools/input/input_pairs.h"
 #include "tests/support/own.h"
 #include "tests/support/test.h"
 
@@ -87,6 +87,55 @@ TEST(test_directory)
     input_free(&in);
     in = read_side(test_path("runs"), (struct input_options){.spp = 4}, &notes);
     assert_true(in.m.spp == 4);
+}
+
+/* A is 1, 2, 6 and B 1, 3, 2 in one channel, so A - B is 0, -1, 4, and B's mean 2: the pairs are 2, 1, 6, of mean 3, M2 =
+ * 1 + 4 + 9 and M3 = -1 - 8 + 27. In the others both sides are the same; of the same renders nothing has noise. */
+TEST(pairs_of_renders)
+{
+    enum { PIXELS = 64 * 64 };
+    static const float a[3][3] = {{1, 5, 0.5f}, {2, 5, 0.25f}, {6, 5, 3}},
+                       b[3][3] = {{1, 5, 0.5f}, {3, 5, 0.25f}, {2, 5, 3}};
+    static float pixels[2][3][3 * PIXELS];
+    static const char *const path[2] = {"new", "old"};
+    char *name[2][3] = {{"1.exr", "2.exr", "3.exr"}, {"1.exr", "2.exr", "3.exr"}};
+    float *image[2][3];
+    struct replicate_dir r[2];
+    for (int i = 0; i < 2; i++) {
+        for (int k = 0; k < 3; k++) {
+            image[i][k] = pixels[i][k];
+            for (int p = 0; p < 3 * PIXELS; p++)
+                pixels[i][k][p] = (i ? b : a)[k][p % 3];
+        }
+        r[i] = (struct replicate_dir){
+            .num = 3, .width = 64, .height = 64, .rgb = image[i], .name = name[i]};
+    }
+    struct err e;
+    for (int same = 0; same < 2; same++) {
+        struct input in[2];
+        struct notes notes = {0};
+        MUST(input_pairs_of_renders(path, same ? (struct replicate_dir[2]){r[1], r[1]} : r, in,
+                                    &notes, &e));
+        assert_true(has_note(&notes, same ? "the same to the bit" : "3 renders, each compared"));
+        assert_string_equal(in[1].m.unit, "exact");
+        assert_string_equal(in[0].m.unit, same ? "exact" : "replicate");
+        static const double mean[2][3] = {{3, 5, 1.25}, {2, 5, 1.25}};
+        for (int i = 0; i < 3 * PIXELS; i++) {
+            assert_near(in[0].m.mean[i], mean[same][i % 3], 1e-12);
+            assert_near(in[1].m.mean[i], mean[1][i % 3], 1e-12);
+            assert_near(in[0].m.m2[i], i % 3 == 0 && !same ? 14 : 0, 1e-12);
+            assert_near(in[0].m.m3[i], i % 3 == 0 && !same ? 18 : 0, 1e-12);
+            assert_true(in[1].m.m2[i] == 0);
+        }
+        input_free(&in[0]);
+        input_free(&in[1]);
+    }
+    struct input in[2];
+    struct notes notes = {0};
+    name[1][2] = "4.exr";
+    REFUSES(input_pairs_of_renders(path, r, in, &notes, &e), "new/3.exr and old/4.exr");
+    r[1].num = 2;
+    REFUSES(input_pairs_of_renders(path, r, in, &notes, &e), "new has 3 renders, old has 2");
 }
 
 /* Renders that are moments EXR say how many paths they have: here 5 samples of a path each, and 7 in the last. */

@@ -152,6 +152,19 @@ def test_second_stage():
     assert assay.compare(BRIGHT, B, again=(replicates(8), replicates(9))).verdict == "NO DIFFERENCE FOUND"
 
 
+def test_pairs_of_one_seed():
+    """A lamp 1 % brighter with the same random numbers: the standard error of the difference is 1 % of that of A alone,
+    (1/2)/sqrt(16 * 3072) = 0.23 % times 0.85, the root of sum f^2 over sum f, so that +1 % is known to 0.01 %."""
+    brighter = (B * np.float32(1.01)).astype(np.float32)
+    r = assay.compare(brighter, B, margin=0.02, paired=True)
+    assert r.verdict == "EQUIVALENT" and abs(r.difference - 0.01) < 1e-4
+    assert assay.compare(brighter, B, margin=0.005, margin_tile=0.006, paired=True).verdict == "DIFFERENT"
+    assert assay.compare(A, B, margin=0.02, paired=True).verdict != "DIFFERENT"
+    assert any("same to the bit" in note for note in assay.compare(B, B, margin=0.02, paired=True).notes)
+    with pytest.raises(assay.NotJudged, match="A has 16 renders, B has 8"):
+        assay.compare(A, B[:8], paired=True)
+
+
 def test_threads():
     expected, got = assay.compare(A, B, margin=0.03).mdb, []
     threads = [threading.Thread(target=lambda: got.append(assay.compare(A, B, margin=0.03).mdb)) for _ in range(4)]

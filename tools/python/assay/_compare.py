@@ -160,7 +160,7 @@ def compare(a, b, *, margin=None, margin_tile=None, margin_variance=None, accept
     accept_mdb, accept_mdb_tile: without margins: passes if nothing is found and no such error could have been missed
     alpha: chance of a wrong DIFFERENT, and of a wrong EQUIVALENT; tile: side of a reporting tile, pixels
     again=(a2, b2): fresh renders of both: DIFFERENT only if they confirm what a and b show
-    paired: both share their noise (one seed, two versions)
+    paired: both share their noise (one seed, two versions); of arrays of K renders each is compared with that of its place
     exchangeable: exact test by permutation of replicates
     same_program: exact test of "nothing changed" between two versions with equally many samples; filter_width: pixels
       nearer than this may share noise (0: it is measured; 1: none do, also of images without moments)
