@@ -139,6 +139,59 @@ TEST(a_throw_is_not_one_of_two)
         both_are_named("cosine_sample_uniform_pdf", "pixels_share_random_numbers", 0, &excess));
 }
 
+/* A rule that stops at e^-1 of the samples, as no other bug does, beside one that shows in images alone. Its effect in the
+ * image is but noise, which is no reason to leave it out. */
+TEST(a_rule_of_stopping_is_one_of_two)
+{
+    const struct catalogue *c = &of.bugs.catalogue;
+    const int light = bug_images_number(&of, "hemisphere_pdf_pi"),
+              rule = bug_images_number(&of, "adaptive_one_sigma");
+    struct submitted_images *h = bug_images_hand_in(&of, 0, light, -1, 1);
+    const struct grading g = {of.rubric, of.answers, h, 1e-5, &of.bugs};
+    struct observation *clue = calloc(RUBRIC_IMAGES, sizeof *clue);
+    struct effect *mine = calloc((size_t)c->num_bugs, sizeof *mine);
+    struct view own[RUBRIC_IMAGES];
+    int num = 0, counts = 0;
+    struct err e;
+    for (int i = 0; i < of.rubric->num_images; i++) {
+        if (!rubric_bugs_can_observe(&g, 0, i))
+            continue;
+        MUST(rubric_bugs_observe(&g, 0, i, &clue[num], &e));
+        const struct view *plain = clue[num++].view;
+        if (!rubric_sight_counts(of.rubric, i) || counts > 0)
+            continue;
+        own[counts] = *plain;
+        own[counts].effect = calloc((size_t)c->num_bugs, sizeof *own[counts].effect);
+        own[counts].correct.fact[FACT_SAMPLES] = 0;
+        own[counts].correct.fact_sd[FACT_SAMPLES] = 0.05;
+        for (int k = 0; k < c->num_bugs; k++) {
+            if (plain->effect[k] != NULL)
+                mine[k] = *plain->effect[k];
+            for (int f = 0; plain->effect[k] == NULL && f < NUM_FACTS; f++)
+                mine[k].fact[f] = mine[k].fact_sd[f] = NAN;
+            mine[k].fact[FACT_SAMPLES] = k == rule ? -1 : 0;
+            mine[k].fact_sd[FACT_SAMPLES] = 0.05;
+            own[counts].effect[k] = &mine[k];
+        }
+        clue[num - 1].view = &own[counts++];
+        clue[num - 1].seen.fact[FACT_SAMPLES] = -1;
+        clue[num - 1].seen.fact_sd[FACT_SAMPLES] = 0.02;
+    }
+    assert_int_equal(counts, 1);
+    const struct diagnose_options opt = {
+        .alpha = 1e-5, .by_likelihood = true, .pairs = true, .clip = rubric_sight_clip(of.rubric)};
+    struct diagnosis found;
+    MUST(diagnose(c, clue, num, &opt, &found, &e));
+    const struct candidate *best = &found.candidate[0];
+    assert_int_equal(found.num_named, 1);
+    assert_true((best->bug == light && best->second == rule) ||
+                (best->bug == rule && best->second == light));
+    free(own[0].effect);
+    free(mine);
+    free(clue);
+    bug_images_take_back(&of, h);
+}
+
 /* A bug that is not in the catalogue is not called by the name of a relative: each of these has some that look like it. */
 TEST(an_unknown_bug_has_no_name)
 {
