@@ -87,9 +87,7 @@ static bool fold_replicates(const struct reference_job *job, const struct replic
         free(px);
     }
     if (ok && repeats.without_noise) {
-        strcpy(m.unit, "exact");
-        for (size_t p = 0; p < pixels; p++)
-            m.n[p] = 1;
+        moments_make_exact(&m);
     } else if (ok && repeats.same >= 0) {
         ok = err_set(
             e, "Cycles: replicate %d is the same image as an earlier one: the seed has no effect",

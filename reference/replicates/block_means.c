@@ -132,13 +132,6 @@ bool block_means_from_json(const json_t *json, int width, int height, struct blo
     return ok;
 }
 
-static void make_exact(struct moments *m)
-{
-    strcpy(m->unit, "exact");
-    for (size_t p = 0; p < (size_t)m->width * (size_t)m->height; p++)
-        m->n[p] = 1;
-}
-
 bool block_means_pair(const struct block_means *a, const struct block_means *b,
                       struct moments *pairs, struct moments *mean, struct err *e)
 {
@@ -167,14 +160,12 @@ bool block_means_pair(const struct block_means *a, const struct block_means *b,
             }
             moments_add(pairs, i / 3, x);
         }
-    make_exact(mean);
+    moments_make_exact(mean);
     strcpy(pairs->unit, "replicate");
     bool varies = false;
     for (size_t i = 0; i < values; i++)
         varies |= pairs->m2[i] > 0;
-    if (!varies) {
-        memset(pairs->m3, 0, values * sizeof *pairs->m3);
-        make_exact(pairs);
-    }
+    if (!varies)
+        moments_make_exact(pairs);
     return true;
 }

@@ -61,10 +61,8 @@ bool truth_render(const struct suite_scene *scene, const struct suite_reference 
     struct moments m = {0};
     bool ok = moments_alloc(&m, scene->width, scene->height, e);
     if (ok) {
-        snprintf(m.unit, sizeof m.unit, "exact");
+        moments_make_exact(&m);
         m.spp = 0;
-        for (size_t i = 0; i < (size_t)m.width * (size_t)m.height; i++)
-            m.n[i] = 1;
         ok = truth_knows(scene, ref, e) && find_kind(ref->kind)->fill(scene, ref, &m, e);
     }
     if (!ok) {

@@ -155,6 +155,16 @@ struct moments moments_rows(const struct moments *m, int y, int num)
     return rows;
 }
 
+void moments_make_exact(struct moments *m)
+{
+    const size_t pixels = (size_t)m->width * (size_t)m->height;
+    strcpy(m->unit, "exact");
+    for (size_t p = 0; p < pixels; p++)
+        m->n[p] = 1;
+    memset(m->m2, 0, 3 * pixels * sizeof *m->m2);
+    memset(m->m3, 0, 3 * pixels * sizeof *m->m3);
+}
+
 bool moments_is_exact(const struct moments *m)
 {
     return strcmp(m->unit, "exact") == 0;

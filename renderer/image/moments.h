@@ -69,6 +69,8 @@ NODISCARD bool moments_merge(struct moments *dst, const struct moments *src, str
 struct moments moments_run(const struct moments *m, size_t first, int num);
 /* A view of rows y .. y+num-1. Owns nothing. */
 struct moments moments_rows(const struct moments *m, int y, int num);
+/* Forgets the noise: the mean is what it is, of unit "exact". Not of packed moments. */
+void moments_make_exact(struct moments *m);
 /* Is the unit "exact", or "picture": a mean without noise, or with noise that nothing is known of? */
 bool moments_is_exact(const struct moments *m);
 bool moments_noise_is_unknown(const struct moments *m);

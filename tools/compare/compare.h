@@ -72,8 +72,7 @@ struct region {
     double log10_p;        /* two-sided p of "no difference beyond the margin" */
     double ci_lo, ci_hi;   /* 1 - 2 alpha interval of `difference`, widened for skew */
     bool ci_valid;         /* false: too skewed for an interval; ci_lo, ci_hi only a hint */
-    double
-        ci_scale; /* so many times its width is due to skewness that no expansion describes, or 1 */
+    double ci_scale; /* how many times as wide it is as an expansion in skewness reaches, or 1 */
     /* About how many times the samples would make skewness, which falls as 1/sqrt n, no hindrance to an interval and to
      * a test; 1: it is none. */
     double unskew_interval, unskew_test;

@@ -9,8 +9,7 @@
 static const double skew_limit = 0.2;       /* skewness factor, in ln p, up to which a p is used as it is */
 static const double skew_limit_raised = 4;  /* the same where p is raised by it */
 static const double largest_gx = 0.3;       /* limit of |g| x there, as the next term has (g x)^2 */
-static const double skew_limit_widened =
-    1; /* the same where the tail of an interval is lowered by it */
+static const double skew_limit_widened = 1; /* the same where an interval's tail is lowered by it */
 static const double skew_limit_scaled = 32; /* the same where the interval is scaled by it, too */
 static const double least_dof = 0.2;        /* below, the end of an interval is beyond any double */
 static const double largest_t = 1e9;
@@ -350,11 +349,11 @@ double region_reach(const struct region *r)
 static bool half_width(const struct judge *j, const struct measured *m, double *width,
                        double *scale)
 {
-    const double alpha = j->opt.alpha, z = stats_normal_quantile(alpha * exp(-1)),
-                 factor = skew_factor(m->skew, z);
+    const double alpha = j->opt.alpha;
     *scale = 1;
     if (raised_quantile(m->skew, alpha, fmax(least_dof, m->dof), skew_limit_widened, width))
         return m->dof >= least_dof;
+    const double z = stats_normal_quantile(alpha * exp(-1)), factor = skew_factor(m->skew, z);
     *scale = fmax(1, z * pow(factor, 1.25) / *width);
     *width *= *scale;
     return !j->is_pooled && factor <= skew_limit_scaled && m->dof >= least_dof;

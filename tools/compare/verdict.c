@@ -74,23 +74,20 @@ static void judge_equivalence(struct comparison *c, const struct region *tiles)
                  100 * tiles[0].margin);
         return;
     }
-    char where[96];
+    char where[96], wide[64] = "";
     place(c, furthest, where, sizeof where);
+    if (furthest->ci_scale > 1)
+        snprintf(wide, sizeof wide, ", %.2g times as wide as samples are skewed,",
+                 furthest->ci_scale);
     c->verdict = VERDICT_INCONCLUSIVE;
     c->extra_factor = fmin(verdict_largest_factor, factor);
     if (!furthest->ci_valid)
         snprintf(c->reason, sizeof c->reason,
                  "%s: samples too skewed for an interval, more of them are needed", where);
-    else if (furthest->ci_scale > 1)
-        snprintf(c->reason, sizeof c->reason,
-                 "%s: interval %+.3g %% to %+.3g %%, %.2g times as wide as samples are skewed, is "
-                 "not inside the margin of %.3g %%",
-                 where, 100 * furthest->ci_lo, 100 * furthest->ci_hi, furthest->ci_scale,
-                 100 * furthest->margin);
     else
         snprintf(c->reason, sizeof c->reason,
-                 "%s: interval %+.3g %% to %+.3g %% is not inside the margin of %.3g %%", where,
-                 100 * furthest->ci_lo, 100 * furthest->ci_hi, 100 * furthest->margin);
+                 "%s: interval %+.3g %% to %+.3g %%%s is not inside the margin of %.3g %%", where,
+                 100 * furthest->ci_lo, 100 * furthest->ci_hi, wide, 100 * furthest->margin);
 }
 
 /* Without a margin equivalence cannot be shown: the reason says what error would have been

@@ -187,13 +187,13 @@ static bool is_reproducible(const struct bug_fit *f, int bug)
         const struct view *v = f->clue[k].view;
         const struct effect *e = v->effect[bug];
         const int values = 3 * v->correct.columns * v->correct.rows;
-        double sum = 0, samples;
+        double sum = 0;
         if (e == NULL)
             continue;
         for (int i = 0; i < values; i++)
             if (e->mean[i] != 0)
                 sum += pow((double)e->mean[i], 2) / (double)e->var[i];
-        samples = e->fact[FACT_SAMPLES] - v->correct.fact[FACT_SAMPLES];
+        const double samples = e->fact[FACT_SAMPLES] - v->correct.fact[FACT_SAMPLES];
         if (sum >= least * values ||
             pow(samples, 2) >= least * (pow(e->fact_sd[FACT_SAMPLES], 2) +
                                         pow(v->correct.fact_sd[FACT_SAMPLES], 2)))

@@ -274,20 +274,22 @@ static struct diagnose_options options_of(const struct grading *g)
         .alpha = g->alpha, .by_likelihood = true, .clip = isfinite(clip) ? clip : 0};
 }
 
-/* Would the bug be seen in an image that is right? */
-static bool is_contradicted(const struct grading *g, int set, const struct candidate *bug,
-                            const bool *right, bool *out, struct err *e)
+/* Takes the names back if one of the bugs would be seen in an image that is right. */
+static bool ask_right_images(const struct grading *g, int set, const bool *right,
+                             struct diagnosis *found, struct err *e)
 {
     const struct catalogue *c = &g->bugs->catalogue;
     struct observation clue;
-    *out = false;
-    for (int i = 0; i < g->r->num_images && !*out; i++) {
+    for (int i = 0; i < g->r->num_images && found->num_named > 0; i++) {
         /* Counts follow the noise of the program, and not the bug alone. */
         if (!right[i] || rubric_sight_counts(g->r, i) || !rubric_bugs_can_observe(g, set, i))
             continue;
         if (!rubric_bugs_observe(g, set, i, &clue, e))
             return false;
-        *out = diagnose_evidence(c, &clue, bug).log_lead < -diagnose_bound(c, g->alpha);
+        for (int k = 0; k < found->num_named; k++)
+            if (diagnose_evidence(c, &clue, &found->candidate[k]).log_lead <
+                -diagnose_bound(c, g->alpha))
+                found->num_named = 0;
     }
     return true;
 }
@@ -308,12 +310,7 @@ bool rubric_bugs_diagnose_part(const struct grading *g, int set, int part, const
         if (signature_mean(&seen->clue[k].seen) <
             black * signature_mean(&seen->clue[k].view->correct))
             *found = (struct diagnosis){0};
-    for (int k = 0; ok && k < found->num_named; k++) {
-        bool contradicted;
-        ok = is_contradicted(g, with, &found->candidate[k], right, &contradicted, e);
-        if (ok && contradicted)
-            found->num_named = 0;
-    }
+    ok = ok && ask_right_images(g, with, right, found, e);
     forget(seen);
     free(seen);
     return ok;

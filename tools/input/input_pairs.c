@@ -5,16 +5,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void make_exact(struct moments *m)
-{
-    const size_t values = 3 * (size_t)m->width * (size_t)m->height;
-    for (size_t i = 0; i < values; i++) {
-        m->n[i / 3] = 1;
-        m->m2[i] = m->m3[i] = 0;
-    }
-    strcpy(m->unit, "exact");
-}
-
 static const char all_the_same[] = "--paired: both sides are the same to the bit";
 
 void input_pairs_of_images(struct input in[2], struct notes *notes)
@@ -27,7 +17,7 @@ void input_pairs_of_images(struct input in[2], struct notes *notes)
         in[i].kind = same ? INPUT_MOMENTS : INPUT_IMAGE;
         in[i].is_guessed = true;
         if (same)
-            make_exact(m[i]);
+            moments_make_exact(m[i]);
     }
     input_notes_add(notes, "%s",
                     same ? all_the_same
@@ -85,9 +75,9 @@ bool input_pairs_of_renders(const char *const path[2], const struct replicate_di
     else if (ok)
         ok = input_measure_sharing(NULL, &d, &in[0], e) && replicate_dir_moments(&d, &in[0].m, e);
     if (ok) {
-        make_exact(&in[1].m);
+        moments_make_exact(&in[1].m);
         if (same)
-            make_exact(&in[0].m);
+            moments_make_exact(&in[0].m);
     }
     if (ok && same)
         input_notes_add(notes, "%s", all_the_same);

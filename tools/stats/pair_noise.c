@@ -26,11 +26,8 @@ bool pair_noise_estimate(const struct moments *a, const struct moments *b, struc
     }
     if (memcmp(a->mean, b->mean, values * sizeof *a->mean) != 0)
         return noise_estimate_variance(&out[0], &out[1], NULL, NULL, NULL, false, &found, e);
-    for (int k = 0; k < 2; k++) {
-        strcpy(out[k].unit, "exact");
-        for (size_t i = 0; i < values / 3; i++)
-            out[k].n[i] = 1;
-    }
+    moments_make_exact(&out[0]);
+    moments_make_exact(&out[1]);
     return true;
 }
 

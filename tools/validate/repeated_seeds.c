@@ -21,15 +21,10 @@
 /* A copy whose mean has no error. */
 static bool without_noise(const struct moments *m, struct moments *out, struct err *e)
 {
-    const size_t pixels = (size_t)m->width * (size_t)m->height;
     if (!moments_copy(m, out, e))
         return false;
-    strcpy(out->unit, "exact");
+    moments_make_exact(out);
     out->sharing = 0;
-    for (size_t p = 0; p < pixels; p++)
-        out->n[p] = 1;
-    memset(out->m2, 0, 3 * pixels * sizeof *out->m2);
-    memset(out->m3, 0, 3 * pixels * sizeof *out->m3);
     return true;
 }
 
