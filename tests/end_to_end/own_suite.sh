@@ -14,32 +14,24 @@ tell "it installs" "$([ -x "$tmp/my usr/bin/assay" ] || tail -n 3 "$tmp/install.
 tell "for all to read, whatever the umask" "$(find "$tmp/my usr"/* ! -type l ! -perm -004 | head -n 3)"
 export PATH="$tmp/once:$tmp/my usr/bin:/usr/bin:$PATH"
 mkdir "$tmp/walk" "$tmp/free" "$tmp/once" "$tmp/rendered"
-# once OUT PROGRAM ARGUMENT...: renders OUT, or copies it if the same command was run before on the same contents of
-# files.
-cat >"$tmp/once/once" <<END
+# The guide's tracer.py SCENE WIDTH HEIGHT SPP SEED OUT: renders OUT, or copies it if the same was rendered before.
+cat >"$tmp/once/python3" <<END
 #!/bin/bash
-out=\$1 words=(\$2) files=()
-shift
-for word in "\${@:2}"; do
-    if [ "\$word" = "\$out" ]; then continue; elif [ -f "\$word" ]; then files+=("\$word"); else words+=("\$word"); fi
-done
-mapfile -t sums < <(exec md5sum "\${files[@]}" - <<<"\${words[*]}")
+[[ \$1 == */tracer.py ]] || exec /usr/bin/python3 "\$@"
+mapfile -t sums < <(exec md5sum "\$1" "\$2" - <<<"\${*:3:4}")
 key=$tmp/rendered/
 for sum in "\${sums[@]}"; do key+=\${sum%% *}; done
 if [ ! -f "\$key" ]; then
-    "\$@" || exit
-    cp "\$out" "\$key.\$\$" && mv "\$key.\$\$" "\$key"
+    /usr/bin/python3 "\$@" || exit
+    cp "\$7" "\$key.\$\$" && mv "\$key.\$\$" "\$key"
 fi
-cp "\$key" "\$out"
+cp "\$key" "\$7"
 END
-# So does python3 for the guide's tracer.py.
-printf '#!/bin/bash\n[[ $1 == */tracer.py ]] && exec once "$7" /usr/bin/python3 "$@"\nexec /usr/bin/python3 "$@"\n' >"$tmp/once/python3"
-chmod +x "$tmp/once"/*
+chmod +x "$tmp/once/python3"
 cd "$tmp/free" || exit 1
 
 # `assay init` makes a folder that works from any directory.
 expect "init" 0 "\`assay validate --suite .*/free/begun\` is green" assay init "$tmp/free/begun"
-sed -i 's/^exec pathtracer/exec once "$7" pathtracer/' begun/mine.sh # the same images are wanted again and again from here on
 expect "init in a folder whose name a shell would split" 0 "\`assay validate --suite 'it'.''s mine'\` is green" assay init "it's mine"
 tell "so does the workflow there quote it" "$(grep -q "validate --suite 'it'.''s mine' --out" "it's mine/renders.yml" || echo "it does not")"
 expect "init does not write over what is there" 3 "begun/suite.json is there already" assay init begun
@@ -77,7 +69,7 @@ tell "the bits of a program that did not change are the same" "$(grep -q '"same_
 expect "with other seeds it is judged by statistics" 0 "all as it should be, 1 the same within their margins" assay validate -q --suite begun --reference-seed 5 --out report
 tell "which say nothing of bits" "$(grep same_bits report/results.json)"
 cp -r begun bits
-printf '#!/bin/sh\necho "$6" >>"$(dirname "$0")/called"\nexec once "$7" pathtracer -q -r "$2" "$3" -s "$4" -m "$5" --seed "$6" -f "$7" "$1"\n' >bits/mine.sh
+printf '#!/bin/sh\necho "$6" >>"$(dirname "$0")/called"\nexec pathtracer -q -r "$2" "$3" -s "$4" -m "$5" --seed "$6" -f "$7" "$1"\n' >bits/mine.sh
 sed -i 's/"margin"/"margin_variance": 0.01, &/' bits/suite.json
 expect "so is its noise, whatever the margin" 0 "all as it should be, 1 the same to the bit" env -C bits assay validate -q
 tell "at no more images than the engine makes" "$(wc -l <bits/called | grep -vx 64)"

@@ -25,11 +25,11 @@ def hit(scene, origin, way):
     return far, normal, albedo
 
 
-def light(scene, at, normal, rng):
+def light(scene, at, normal, random):
     """Reflected radiance (albedo 1) from a random point of the lamp, over the point's density."""
     lamp = scene["lamp"]
-    to = np.column_stack([lamp["size"] * (rng.random(len(at)) - 0.5), np.full(len(at), lamp["height"]),
-                          lamp["size"] * (rng.random(len(at)) - 0.5)]) - at
+    to = np.column_stack([lamp["size"] * (random[0] - 0.5), np.full(len(at), lamp["height"]),
+                          lamp["size"] * (random[1] - 0.5)]) - at
     far = np.sqrt((to * to).sum(1))
     way = to / far[:, None]
     lit = hit(scene, at + 1e-4 * normal, way)[0] > far
@@ -37,29 +37,34 @@ def light(scene, at, normal, rng):
     return lit * cosines * lamp["radiance"] * lamp["size"] ** 2 / far**2 / np.pi
 
 
-def around(normal, rng):
+def around(normal, random):
     """Cosine-distributed directions around the normals."""
-    a, z = 2 * np.pi * rng.random(len(normal)), 2 * rng.random(len(normal)) - 1
+    a, z = 2 * np.pi * random[0], 2 * random[1] - 1
     way = normal + np.column_stack([np.sqrt(1 - z * z) * np.cos(a), np.sqrt(1 - z * z) * np.sin(a), z])
     return way / np.sqrt((way * way).sum(1))[:, None]
 
 
-def render(scene, width, height, spp, seed):
-    """(height, width, 3), rows from the top."""
-    rng, num = np.random.default_rng(seed), width * height * spp
-    x = (np.tile(np.repeat(np.arange(width), spp), height) + rng.random(num)) / width - 0.5
-    y = 0.5 - (np.repeat(np.arange(height), width * spp) + rng.random(num)) / height
-    origin = np.tile([0.0, 1, 4], (num, 1))
-    way = np.column_stack([x, y * height / width - 0.15, np.full(num, -1.0)])
+def render_row(scene, row, width, height, spp, random):
+    """(width, 3)"""
+    x = (np.repeat(np.arange(width), spp) + random[0]) / width - 0.5
+    y = 0.5 - (row + random[1]) / height
+    origin = np.tile([0.0, 1, 4], (len(x), 1))
+    way = np.column_stack([x, y * height / width - 0.15, np.full(len(x), -1.0)])
     way /= np.sqrt((way * way).sum(1))[:, None]
-    total, left = np.zeros((num, 3)), np.ones((num, 3))
+    total, left = np.zeros((len(x), 3)), np.ones((len(x), 3))
     for bounce in range(2):
         far, normal, albedo = hit(scene, origin, way)
         left *= np.where(np.isfinite(far), 1, 0)[:, None] * albedo
         origin = origin + np.where(np.isfinite(far), far, 0)[:, None] * way + 1e-4 * normal
-        total += left * light(scene, origin, normal, rng)[:, None]
-        way = around(normal, rng)
-    return total.reshape(height, width, spp, 3).mean(2)
+        total += left * light(scene, origin, normal, random[4 * bounce + 2:])[:, None]
+        way = around(normal, random[4 * bounce + 4:])
+    return total.reshape(width, spp, 3).mean(1)
+
+
+def render(scene, width, height, spp, seed):
+    """(height, width, 3), rows from the top."""
+    random = np.random.default_rng(seed).random((10, height, width * spp))
+    return np.array([render_row(scene, row, width, height, spp, random[:, row]) for row in range(height)])
 
 
 if __name__ == "__main__":
