@@ -178,7 +178,7 @@ static void print_result(const struct compare_job *job, const struct compared *c
                r->num_tests);
     print_noise(&r->variance);
     if (r->extra_factor > 1) {
-        verdict_more_samples(r->extra_factor, "samples", more);
+        verdict_more_samples(r->extra_factor, "samples", verdict_is_near_margin(r), more);
         printf("%s\n", more);
     }
     for (int i = 0; i < c->notes.num; i++)

@@ -115,6 +115,9 @@ static bool fill_tiles(const struct judge *j, const struct pyramid *p, struct co
         struct region *tile = &(*tiles)[i];
         *tile = region_fill(j, &level->cell[i], r, CHANNEL_LUMINANCE);
         tile->mdb = mdb_of(j, p, i);
+        const struct measured around = channel_sweep_measure(j, p, 0, i);
+        if (region_testable(j, &around))
+            tile->log10_p_equal = region_log10_p_equal(j, &around, CHANNEL_LUMINANCE);
         out->mdb_tile = fmax(out->mdb_tile, tile->mdb);
         out->tile_t[i] = tile->t;
         out->tile_log10_p[i] = region_log10_p_equal(j, &m, CHANNEL_LUMINANCE);
@@ -204,7 +207,9 @@ bool compare_moments(const struct moments *a, const struct moments *b,
         const struct cell *image = &p->level[p->num_levels - 1].cell[0];
         struct measured m = region_measure(&j, image, whole);
         out->global[c] = region_fill(&j, image, whole, c);
-        out->global[c].mdb = region_testable(&j, &m) ? region_mdb(&j, &m, c) : region_mdb_none;
+        const bool is_tested = region_testable(&j, &m);
+        out->global[c].mdb = is_tested ? region_mdb(&j, &m, c) : region_mdb_none;
+        out->global[c].log10_p_equal = is_tested ? region_log10_p_equal(&j, &m, c) : 0;
         if (c < CHANNEL_LUMINANCE)
             squared += luminance_weight[c] * claim.sweep[c].squared;
     }

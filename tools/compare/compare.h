@@ -70,6 +70,8 @@ struct region {
     double dof;            /* Welch-Satterthwaite; 0 if there is no noise */
     double t;              /* difference / std_error; 0 if both are 0 */
     double log10_p;        /* two-sided p of "no difference beyond the margin" */
+    double
+        log10_p_equal; /* of the image and of reporting tiles: of "no difference"; 0 where no test can tell */
     double ci_lo, ci_hi;   /* 1 - 2 alpha interval of `difference`, widened for skew */
     bool ci_valid;         /* false: too skewed for an interval; ci_lo, ci_hi only a hint */
     double ci_scale; /* how many times as wide it is as an expansion in skewness reaches, or 1 */
@@ -90,6 +92,10 @@ struct comparison {
     struct region global[4];  /* per channel and luminance */
     struct region worst;      /* the region with the smallest p relative to its level */
     struct region worst_tile; /* reporting tile whose interval reaches furthest out, luminance */
+    /* With a margin, of the image's channels and the tiles: those whose difference is not noise (log10_p_equal, over all
+     * of them at once) and, noise taken off, more than a tenth of its margin; of these the one that reaches furthest.
+     * width 0: there is none. Decides nothing. */
+    struct region significant;
     double mdb_global;        /* of luminance */
     double mdb_tile;          /* largest over the reporting tiles, luminance */
     double rms_bias;          /* debiased RMS error over pixels and RGB (weighted as luminance) in

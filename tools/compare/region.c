@@ -226,6 +226,8 @@ static double log10_p_at(double dof, double t, double skew)
 
 double region_raised_log10_p(double t, double dof, double skew)
 {
+    if (isinf(skew))
+        return 0;
     const double least = t_of_least_p(dof, skew);
     double log10_p = log10_p_at(dof, t, skew);
     if (least < t)
@@ -276,7 +278,8 @@ double region_log10_p_equal(const struct judge *j, const struct measured *m, int
     double excess = fmax(0, fabs(m->d) - m->tolerance);
     if (m->noise_free)
         return log10_p_noise_free(j, m, excess, channel);
-    double log10_p = region_raised_log10_p(excess / sqrt(m->v), m->dof, m->skew);
+    const double skew = isinf(m->skew_around) ? m->skew : fmax(m->skew, m->skew_around);
+    double log10_p = region_raised_log10_p(excess / sqrt(m->v), m->dof, skew);
     return m->may_have_missed ? fmax(log10_p, log10_p_missed(j, m, excess, channel)) : log10_p;
 }
 

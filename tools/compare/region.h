@@ -71,7 +71,7 @@ struct measured region_measure_weighted(const struct judge *j, const struct cell
 void region_look_around(const struct judge *j, struct measured *m, const struct cell *around);
 
 /* Two-sided log10 p of Student's t, raised by the factor that skewness may cause at t; a larger t is no likelier than
- * a smaller one, so that it has the least p of these. skew 0: as it is. */
+ * a smaller one, so that it has the least p of these. skew 0: as it is; INFINITY: 0, as t then says nothing. */
 double region_raised_log10_p(double t, double dof, double skew);
 /* Is a p trusted at the critical value x, if it is raised where *raised is set? These are the rules below. */
 bool region_skew_is_testable(double skew, double x, bool *raised);
@@ -97,7 +97,7 @@ double region_missed_z(const struct judge *j, const struct measured *m, int chan
 /* The normal equivalent of that p, accurate to about 3 %, for a region with noise: for ranking only. */
 double region_rank(const struct judge *j, const struct measured *m);
 
-/* Two-sided log10 p of "no bias", raised by the skew factor: for the histogram of tiles. */
+/* Two-sided log10 p of "no bias", raised by the skew factor. */
 double region_log10_p_equal(const struct judge *j, const struct measured *m, int channel);
 
 /* difference / std_error, within +-1e9 where there is no noise. */
@@ -121,7 +121,7 @@ extern const char *const channel_name[NUM_CHANNELS];
 /* "the image (red)" or "16 x 16 pixels at 32,48 (luminance)". */
 void region_name(int width, int height, struct rect r, int channel, char *text, size_t size);
 
-/* Fills all of a struct region except mdb, which is 0. */
+/* Fills all of a struct region except mdb and log10_p_equal, which are 0. */
 struct region region_fill(const struct judge *j, const struct cell *cell, struct rect r,
                           int channel);
 

@@ -11,6 +11,7 @@
 #include <string.h>
 
 const double verdict_largest_factor = 100;
+static const double worth_saying = 0.1; /* of its margin, where a difference is not noise */
 
 static bool inside_margin(const struct region *r)
 {
@@ -51,32 +52,57 @@ static double factor_needed(const struct region *r, size_t num_intervals)
     return gap > 0 ? samples_to_reach(gap, half, spare, r->ci_scale) : verdict_largest_factor;
 }
 
-static void judge_equivalence(struct comparison *c, const struct region *tiles)
+static double reach_of_margin(const struct region *r)
+{
+    return region_reach(r) / r->margin;
+}
+
+static bool is_significant(const struct region *r, double alpha, size_t num_intervals)
+{
+    return r->ci_valid && r->log10_p_equal <= log10(alpha / (double)num_intervals) &&
+           fmax(r->ci_lo, -r->ci_hi) > worth_saying * r->margin;
+}
+
+static void judge_equivalence(struct comparison *c, const struct compare_options *opt,
+                              const struct region *tiles)
 {
     size_t num_tiles = (size_t)c->tiles_x * (size_t)c->tiles_y, num = num_tiles + NUM_CHANNELS;
-    const struct region *furthest = NULL;
+    const struct region *furthest = NULL, *significant = NULL;
     double factor = 1;
     for (size_t i = 0; i < num; i++) {
         const struct region *r = i < NUM_CHANNELS ? &c->global[i] : &tiles[i - NUM_CHANNELS];
+        if (is_significant(r, opt->alpha, num) &&
+            (significant == NULL || reach_of_margin(r) > reach_of_margin(significant)))
+            significant = r;
         if (inside_margin(r))
             continue;
         factor = fmax(factor, factor_needed(r, num));
         if (furthest == NULL || (furthest->ci_valid && !r->ci_valid) ||
-            (furthest->ci_valid == r->ci_valid &&
-             region_reach(r) / r->margin > region_reach(furthest) / furthest->margin))
+            (furthest->ci_valid == r->ci_valid && reach_of_margin(r) > reach_of_margin(furthest)))
             furthest = r;
     }
+    if (significant != NULL)
+        c->significant = *significant;
+    char where[96], wide[64] = "";
     if (furthest == NULL) {
         c->verdict = VERDICT_EQUIVALENT;
         snprintf(c->reason, sizeof c->reason,
                  "the image lies within %.3g %% and each of %zu tile%s within %.3g %%",
                  100 * c->global[CHANNEL_LUMINANCE].margin, num_tiles, num_tiles == 1 ? "" : "s",
                  100 * tiles[0].margin);
+        if (significant == NULL)
+            return;
+        const size_t used = strlen(c->reason);
+        place(c, significant, where, sizeof where);
+        snprintf(c->reason + used, sizeof c->reason - used,
+                 "; %s: %+.3g %% to %+.3g %% is not noise", where, 100 * significant->ci_lo,
+                 100 * significant->ci_hi);
         return;
     }
-    char where[96], wide[64] = "";
     place(c, furthest, where, sizeof where);
-    if (furthest->ci_scale > 1)
+    if (furthest == significant)
+        snprintf(wide, sizeof wide, ", which is not noise,");
+    else if (furthest->ci_scale > 1)
         snprintf(wide, sizeof wide, ", %.2g times as wide as samples are skewed,",
                  furthest->ci_scale);
     c->verdict = VERDICT_INCONCLUSIVE;
@@ -211,20 +237,25 @@ void verdict_decide(struct comparison *c, const struct compare_options *opt,
     if (rejected)
         judge_different(c, opt);
     else if (opt->margin_global > 0)
-        judge_equivalence(c, tiles);
+        judge_equivalence(c, opt, tiles);
     else
         judge_search(c);
     if (!rejected && opt->margin_variance > 0)
         judge_variance(c, opt);
 }
 
-void verdict_more_samples(double factor, const char *of_what, char text[128])
+bool verdict_is_near_margin(const struct comparison *c)
 {
+    return c->significant.width > 0 && region_reach(&c->significant) > c->significant.margin;
+}
+
+void verdict_more_samples(double factor, const char *of_what, bool is_near_margin, char text[128])
+{
+    const char *other = is_near_margin ? "choose another margin, as the difference is close to it"
+                                       : "raise the margin or enlarge the tile";
     if (factor < verdict_largest_factor)
         snprintf(text, 128, "about %.1f times the %s would decide", fmax(factor, 1.1), of_what);
     else
-        snprintf(
-            text, 128,
-            "more than %.0f times the %s would be needed: raise the margin or enlarge the tile",
-            verdict_largest_factor, of_what);
+        snprintf(text, 128, "more than %.0f times the %s would be needed: %s",
+                 verdict_largest_factor, of_what, other);
 }

@@ -19,7 +19,10 @@ struct verdict_p {
 
 /* The largest extra_factor; it means "this or more". */
 extern const double verdict_largest_factor;
-/* What extra_factor says: "about 2.5 times the samples would decide", or what else can be done. */
-void verdict_more_samples(double factor, const char *of_what, char text[128]);
+/* What extra_factor says: "about 2.5 times the samples would decide", or what else can be done. is_near_margin: what
+ * reaches over its margin is a difference that is not noise. */
+void verdict_more_samples(double factor, const char *of_what, bool is_near_margin, char text[128]);
+/* That, of a comparison that is INCONCLUSIVE. */
+bool verdict_is_near_margin(const struct comparison *c);
 
 #endif

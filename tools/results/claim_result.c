@@ -49,7 +49,9 @@ static bool add_findings(json_t *claim, const struct comparison *r)
 {
     const struct hint *h = &r->hint;
     const struct variance_ratio *v = &r->variance;
-    return (h->name == NULL ||
+    return (r->significant.width == 0 ||
+            json_object_set_new(claim, "significant", region_json(&r->significant)) == 0) &&
+           (h->name == NULL ||
             json_object_set_new(claim, "hint",
                                 json_pack("{s:s, s:f, s:f, s:s}", "name", h->name, "removed",
                                           h->removed, "amount", h->amount, "unit", h->unit)) ==
@@ -151,6 +153,9 @@ static const struct shape worst_tile_shape = {
 static const struct shape worst_shape = {.names = {[IS_NUMBER] = "difference t",
                                                    [IS_COUNT] = "x y width height channel",
                                                    [IS_INTERVAL] = "ci"}};
+static const struct shape significant_shape = {.names = {[IS_NUMBER] = "difference t margin",
+                                                         [IS_COUNT] = "x y width height channel",
+                                                         [IS_INTERVAL] = "ci"}};
 static const struct shape statistic_shape = {
     .names = {[IS_TEXT] = "name what", [IS_NUMBER] = "share log10_p", [IS_COUNT] = "num_tests"}};
 static const struct shape hint_shape = {
@@ -172,6 +177,7 @@ static const struct shape judged_shape = {
          [IS_COUNTS] = "seeds_b?"},
     .part = {{"worst_tile", &worst_tile_shape, PART_OBJECT},
              {"worst", &worst_shape, PART_OBJECT},
+             {"significant?", &significant_shape, PART_OBJECT},
              {"statistics", &statistic_shape, PART_LIST_OF_1},
              {"files", &files_shape, PART_OBJECT},
              {"hint?", &hint_shape, PART_OBJECT},
@@ -214,8 +220,11 @@ static bool check_judged(const json_t *claim, enum verdict expected, const char 
     if (!check_tiles(claim, "tile_log10_p", num_tiles, where, e) ||
         !check_tiles(claim, "tile_t", num_tiles, where, e))
         return false;
-    if (json_integer_value(json_object_get(json_object_get(claim, "worst"), "channel")) > 3)
-        return err_set(e, "%s: 'worst.channel' is not from 0 to 3", where);
+    for (int i = 0; i < 2; i++) {
+        const char *name = i == 0 ? "worst" : "significant";
+        if (json_integer_value(json_object_get(json_object_get(claim, name), "channel")) > 3)
+            return err_set(e, "%s: '%s.channel' is not from 0 to 3", where, name);
+    }
 
     enum verdict verdict;
     const char *name = member_text(claim, "verdict");

@@ -68,6 +68,25 @@ static struct plain_words place(const json_t *claim, const json_t *region)
     return w;
 }
 
+/* "1.3 % too bright in red in the .. pixels at ..", of a region. */
+static struct plain_words amount_and_place(const json_t *claim, const json_t *region)
+{
+    static const char *const channels[] = {" in red", " in green", " in blue", ""};
+    struct plain_words w;
+    const int channel = (int)member_number(region, "channel");
+    snprintf(w.s, sizeof w.s, "%.64s%s%.64s", amount(member_number(region, "difference")).s,
+             channel >= 0 && channel < 3 ? channels[channel] : "", place(claim, region).s);
+    return w;
+}
+
+/* Of a claim that is undecided: does a difference that is not noise reach over its margin? */
+static bool is_near_margin(const json_t *claim)
+{
+    const json_t *region = json_object_get(claim, "significant");
+    const double margin = member_number(region, "margin");
+    return region != NULL && !is_inside(region, "ci", -margin, margin);
+}
+
 /* Is the mean the same and the variance not known to be? */
 static bool only_the_variance_is_open(const json_t *claim)
 {
@@ -83,7 +102,6 @@ static bool only_the_variance_is_open(const json_t *claim)
 
 static struct plain_words too_bright(const json_t *claim)
 {
-    static const char *const channels[] = {" red", " green", " blue", ""};
     const json_t *tile = json_object_get(claim, "worst_tile"),
                  *worst = json_object_get(claim, "worst");
     if (outside(claim, "ci", member_number(claim, "margin_global")) != 0)
@@ -96,13 +114,9 @@ static struct plain_words too_bright(const json_t *claim)
     }
     if (plain_words_noise(claim).s[0] != '\0')
         return plain_words_noise(claim);
-    const double difference = member_number(worst, "difference");
-    const int channel = (int)member_number(worst, "channel");
-    if (difference == 0 || member_number(worst, "width") == 0)
-        snprintf(w.s, sizeof w.s, "not the same, most of all%.64s", place(claim, tile).s);
-    else
-        snprintf(w.s, sizeof w.s, "%.64s%s%.64s", amount(difference).s,
-                 channel >= 0 && channel < 3 ? channels[channel] : "", place(claim, worst).s);
+    if (member_number(worst, "difference") != 0 && member_number(worst, "width") > 0)
+        return amount_and_place(claim, worst);
+    snprintf(w.s, sizeof w.s, "not the same, most of all%.64s", place(claim, tile).s);
     return w;
 }
 
@@ -136,7 +150,8 @@ struct plain_words plain_words_more_samples(const json_t *claim)
     char more[128];
     if (!(factor > 1)) /* 1: nobody knows */
         return w;
-    verdict_more_samples(times, both ? "samples on both sides" : "samples", more);
+    verdict_more_samples(times, both ? "samples on both sides" : "samples", is_near_margin(claim),
+                         more);
     const double num_a = in_words ? 0 : replicates(claim, "unit_a", "n_a", times),
                  num_b = both ? replicates(claim, "unit_b", "n_b", times) : 0;
     size_t at = (size_t)snprintf(w.s, sizeof w.s, "%s", more);
@@ -175,8 +190,17 @@ struct plain_words plain_words_claim(const json_t *claim)
                  reason);
     } else if (strcmp(verdict, "INCONCLUSIVE") == 0) {
         const struct plain_words more = plain_words_more_samples(claim);
-        snprintf(w.s, sizeof w.s, "%.100s is too noisy to tell%.110s (against %.100s)%s%.200s", a,
-                 scene.s, b, more.s[0] != '\0' ? ": " : "", more.s);
+        const char *colon = more.s[0] != '\0' ? ": " : "";
+        const json_t *region = json_object_get(claim, "significant");
+        if (is_near_margin(claim))
+            snprintf(w.s, sizeof w.s,
+                     "%.100s is %.120s%.110s (against %.100s), which is not noise, but may be "
+                     "within the margin of %.3g %%%s%.140s",
+                     a, amount_and_place(claim, region).s, scene.s, b,
+                     100 * member_number(region, "margin"), colon, more.s);
+        else
+            snprintf(w.s, sizeof w.s, "%.100s is too noisy to tell%.110s (against %.100s)%s%.200s",
+                     a, scene.s, b, colon, more.s);
     } else
         snprintf(
             w.s, sizeof w.s,
@@ -251,37 +275,38 @@ static void print_failures(FILE *f, const json_t *results, size_t bad)
         fprintf(f, "; and %zu more", bad - covered);
 }
 
-/* Of a claim that is inside its margin: the share of the margin that its difference has at least, noise taken off. */
+/* Of a claim that is inside its margin: the share of the margin that a difference has at least, noise taken off; 0: none
+ * is more than noise. */
 static double share_of_margin(const json_t *claim)
 {
-    const json_t *ci = json_object_get(claim, "ci");
+    const json_t *region = json_object_get(claim, "significant"),
+                 *ci = json_object_get(region, "ci");
     const double lo = json_number_value(json_array_get(ci, 0)),
-                 hi = json_number_value(json_array_get(ci, 1)),
-                 margin = member_number(claim, "margin_global");
-    const bool is_inside = ci != NULL && margin > 0 &&
-                           strcmp(member_or_empty(claim, "verdict"), "EQUIVALENT") == 0 &&
-                           results_claim_outcome(claim) == OUTCOME_AS_EXPECTED;
-    return is_inside ? fmax(lo, -hi) / margin : 0;
+                 hi = json_number_value(json_array_get(ci, 1));
+    const bool is_known = region != NULL &&
+                          strcmp(member_or_empty(claim, "verdict"), "EQUIVALENT") == 0 &&
+                          results_claim_outcome(claim) == OUTCOME_AS_EXPECTED;
+    return is_known ? fmax(lo, -hi) / member_number(region, "margin") : 0;
 }
 
 /* A difference that matters to nobody, by the margin, is still one: a new version has it, or the margin is too wide. */
 static void print_inside(FILE *f, const json_t *claims)
 {
-    static const double worth_saying = 0.25;
     const json_t *most = NULL;
     size_t num = 0;
     json_each(claim, claims) {
-        num += share_of_margin(claim) > worth_saying;
-        if (share_of_margin(claim) > fmax(worth_saying, most != NULL ? share_of_margin(most) : 0))
+        num += share_of_margin(claim) > 0;
+        if (share_of_margin(claim) > (most != NULL ? share_of_margin(most) : 0))
             most = claim;
     }
     if (num == 0)
         return;
+    const json_t *region = json_object_get(most, "significant");
     fprintf(
         f,
         "\nnote:   %.100s is %s%.110s (against %.100s), which is not noise, but within its %.3g %%",
-        member_or_empty(most, "a"), amount(member_number(most, "difference")).s, on_scene(most).s,
-        member_or_empty(most, "b"), 100 * member_number(most, "margin_global"));
+        member_or_empty(most, "a"), amount_and_place(most, region).s, on_scene(most).s,
+        member_or_empty(most, "b"), 100 * member_number(region, "margin"));
     if (num > 1)
         fprintf(f, "; and %zu more", num - 1);
 }

@@ -7,7 +7,7 @@
 #include <stdio.h>
 
 struct plain_words {
-    char s[640];
+    char s[768];
 };
 
 /* A claim in one sentence. If DIFFERENT, which image is how much too bright or too dark, and where: "mine is 1.0 %

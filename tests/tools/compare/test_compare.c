@@ -678,6 +678,59 @@ TEST(test_extra_factor)
     assert_true(equivalent[1] < 30);
 }
 
+/* The image's standard error is 0.05 %: v = 3.2e-5 a pixel and side, sqrt(256 (v + v))/256. With Student's 3.1 for alpha
+ * 1e-3 its interval is +-0.155 %; a tile's, of 64 pixels, is twice that, far inside 8 %. Of the margin of 2 %: a bias of
+ * 1.5 % is inside, and 30 standard errors are not noise; 1.95 % reaches over it; so does nothing in noise of 1 %,
+ * which is 20 times as large; 0.25 % is 5 standard errors, but less than 0.2 % with the noise taken off; without a bias (1e-5, as equal bits are refused)
+ * there is nothing. */
+TEST(test_a_difference_that_is_not_noise)
+{
+    const struct {
+        double bias, noise;
+        enum verdict verdict;
+        bool is_significant;
+        const char *says;
+    } cases[] = {
+        {0.015, 1, VERDICT_EQUIVALENT, true,
+         "each of 4 tiles within 8 %; the image (red): +1.34 % to +1.66 % is not noise"},
+        {0.0195, 1, VERDICT_INCONCLUSIVE, true,
+         "+1.79 % to +2.11 %, which is not noise, is not inside the margin of 2 %"},
+        {1e-5, 20, VERDICT_INCONCLUSIVE, false, "interval -3.12 % to +3.12 % is not inside"},
+        {0.0025, 1, VERDICT_EQUIVALENT, false, "each of 4 tiles within 8 %"},
+        {1e-5, 1, VERDICT_EQUIVALENT, false, "each of 4 tiles within 8 %"},
+    };
+    OWN(moments) a = new_moments(16, 16, "sample"), b = new_moments(16, 16, "sample");
+    for (size_t i = 0; i < COUNT(cases); i++) {
+        const double v = 3.2e-5 * cases[i].noise * cases[i].noise;
+        set_all(&a, 101, 1 + cases[i].bias, v * 101 * 100, 0);
+        set_all(&b, 101, 1, v * 101 * 100, 0);
+        OWN(comparison)
+        c = compare(&a, &b, (struct compare_options){1e-3, 0.02, 0.08, 8, 0, 1, false});
+        print_message("%s: %s\n", verdict_name(c.verdict), c.reason);
+        assert_int_equal(c.verdict, cases[i].verdict);
+        assert_non_null(strstr(c.reason, cases[i].says));
+        assert_int_equal(c.significant.width, cases[i].is_significant ? 16 : 0);
+        assert_int_equal(strstr(c.reason, "noise") != NULL, cases[i].is_significant);
+        assert_int_equal(verdict_is_near_margin(&c),
+                         cases[i].is_significant && c.verdict == VERDICT_INCONCLUSIVE);
+        char more[128];
+        verdict_more_samples(100, "samples", verdict_is_near_margin(&c), more);
+        assert_int_equal(strstr(more, "choose another margin") != NULL, verdict_is_near_margin(&c));
+    }
+}
+
+/* What skewness forbids to test has no small p, wherever t is: 8 samples against 64 of a law that is black in 9 of 10. */
+TEST(test_worst_tile_that_cannot_be_tested)
+{
+    OWN(moments) a = new_moments(16, 16, "sample"), b = new_moments(16, 16, "sample");
+    uint64_t seed = 8;
+    simulate(&a, LAW_BLACK, 1, 8, true, &seed);
+    simulate(&b, LAW_BLACK, 1, 64, true, &seed);
+    OWN(comparison) c = compare(&a, &b, (struct compare_options){1e-3, 0.9, 0.9, 8, 0, 1, false});
+    assert_true(c.skew_limited);
+    assert_true(c.worst_tile.log10_p > -3);
+}
+
 /* No margin, no EQUIVALENT: with too few samples to see half the light gone in a tile, what is said is
  * that a tile could hide more than that. 32 x 32 pixels, v = 1 a pixel and side: a tile's standard error is
  * sqrt(512)/256 = 0.088; x is 6.55 at 0.44e-6 over at most 4 x 1365 tests, and 1.65 for the 95 %. */
@@ -701,9 +754,9 @@ TEST(test_nothing_found)
     assert_int_equal(d.verdict, VERDICT_INCONCLUSIVE);
     assert_true(d.extra_factor == 100);
     char more[128];
-    verdict_more_samples(d.extra_factor, "samples", more);
+    verdict_more_samples(d.extra_factor, "samples", false, more);
     assert_non_null(strstr(more, "more than 100 times the samples"));
-    verdict_more_samples(99.94, "samples", more);
+    verdict_more_samples(99.94, "samples", false, more);
     assert_string_equal(more, "about 99.9 times the samples would decide");
 }
 

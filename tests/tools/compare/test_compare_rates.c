@@ -97,6 +97,42 @@ TEST(test_false_different)
     }
 }
 
+/* H0: equal means, with margins: "not noise" is said of at most alpha of the claims. Its tenth of the margin is nothing
+ * beside the noise here (1e-9). Control: 5 % brighter, at 64 and 64 of the normal law some 7 standard errors of an image
+ * of 8 x 8, is seen in most. */
+TEST(test_false_significance)
+{
+    const struct {
+        enum law law;
+        int n_a, n_b;
+        double mean;
+    } cases[] = {{LAW_NORMAL, 16, 16, 1},     {LAW_EXPONENTIAL, 64, 64, 1},
+                 {LAW_BLACK, 16, 1024, 1},    {LAW_EXPONENTIAL, 16, 1024, 1},
+                 {LAW_EXPONENTIAL, 64, 0, 1}, {LAW_NORMAL, 64, 64, 1.05}};
+    const struct compare_options opt = {alpha, 1e-8, 1e-8, 4, 0, 1, false};
+    for (size_t i = 0; i < COUNT(cases); i++) {
+        enum { SIDE = 8, CLAIMS = 2000 };
+        OWN(moments) a = new_moments(SIDE, SIDE, "sample");
+        OWN(moments) b = new_moments(SIDE, SIDE, cases[i].n_b > 0 ? "sample" : "exact");
+        uint64_t seed = 3000 + i;
+        int said = 0;
+        for (int k = 0; k < CLAIMS; k++) {
+            simulate(&a, cases[i].law, cases[i].mean, cases[i].n_a, true, &seed);
+            if (cases[i].n_b > 0)
+                simulate(&b, cases[i].law, 1, cases[i].n_b, true, &seed);
+            else
+                constant(&b, 1, 1);
+            OWN(comparison) c = compare(&a, &b, opt);
+            said += c.significant.width > 0 || c.verdict == VERDICT_DIFFERENT;
+        }
+        print_message("case %zu: %.2f %% not noise or DIFFERENT\n", i, 100.0 * said / CLAIMS);
+        if (cases[i].mean > 1)
+            assert_true(said > CLAIMS / 2);
+        else
+            assert_true(lower_bound(said, CLAIMS) <= alpha);
+    }
+}
+
 /* 32 samples a pixel of a law of mean `scale`: exponential, with 0.9 of the light, and 1000 in one sample of 10 000. */
 static void fill_with_fireflies(struct moments *m, double scale, uint64_t *seed)
 {

@@ -18,6 +18,18 @@ static json_t *claim_of(const char *verdict, const char *expected, double image,
     return c;
 }
 
+/* With a difference that is not noise, +-0.1 %, of the image of 64 x 48 pixels or of a tile in it. */
+static json_t *with_significant(json_t *claim, double difference, bool is_tile, int channel)
+{
+    json_object_update_new(
+        claim,
+        json_pack("{sf sf sf s{sf sf sf sf si sf s[ff] sf}}", "tile", 16., "tiles_x", 4., "tiles_y",
+                  3., "significant", "x", is_tile ? 32. : 0., "y", 0., "width", is_tile ? 16. : 64.,
+                  "height", is_tile ? 16. : 48., "channel", channel, "difference", difference, "ci",
+                  difference - 0.001, difference + 0.001, "margin", is_tile ? 0.01 : 0.002));
+    return claim;
+}
+
 static void assert_says(json_t *claim, const char *sentence)
 {
     assert_string_equal(plain_words_claim(claim).s, sentence);
@@ -38,7 +50,7 @@ TEST(who_how_much_and_where)
         "mine is 1.3 % too dark in the 16 x 16 pixels at 32,16 on 12_point_plane (against truth)");
     assert_says(
         claim_of("DIFFERENT", "EQUIVALENT", 0, 0.011, 0.5, 0),
-        "mine is 50.0 % too bright red in the 2 x 2 pixels at 32,16 on 12_point_plane (against truth)");
+        "mine is 50.0 % too bright in red in the 2 x 2 pixels at 32,16 on 12_point_plane (against truth)");
     /* A region that is the image, of 64 x 48 pixels and 4 x 3 tiles, is no place. */
     json_t *all = claim_of("DIFFERENT", "EQUIVALENT", 0, 0, -0.033, 2), *most_of_it;
     json_object_update_new(all, json_pack("{si si si}", "tile", 16, "tiles_x", 4, "tiles_y", 3));
@@ -47,8 +59,8 @@ TEST(who_how_much_and_where)
         json_pack("{sf sf sf sf}", "x", 0., "y", 0., "width", 64., "height", 48.));
     most_of_it = json_deep_copy(all);
     json_object_set_new(json_object_get(most_of_it, "worst"), "height", json_real(32));
-    assert_says(all, "mine is 3.3 % too dark blue on 12_point_plane (against truth)");
-    assert_says(most_of_it, "mine is 3.3 % too dark blue in the 64 x 32 pixels at 0,0 on "
+    assert_says(all, "mine is 3.3 % too dark in blue on 12_point_plane (against truth)");
+    assert_says(most_of_it, "mine is 3.3 % too dark in blue in the 64 x 32 pixels at 0,0 on "
                             "12_point_plane (against truth)");
     assert_says(claim_of("EQUIVALENT", "DIFFERENT", 0, 0, 0, 3),
                 "mine is the same on 12_point_plane (as truth), within 0.2 %");
@@ -65,6 +77,25 @@ TEST(who_how_much_and_where)
         "mine is too noisy to tell on 12_point_plane (against truth): more than 100 times the samples "
         "would be needed: raise the margin or enlarge the tile");
     assert_says(unknown, "mine is too noisy to tell on 12_point_plane (against truth)");
+    /* Not noise: neither is it said to be, nor is a larger margin called the way out. */
+    json_t *near = with_significant(claim_of("INCONCLUSIVE", "EQUIVALENT", 0, 0, 0, 3), -0.00141,
+                                    false, 2),
+           *too_near = json_deep_copy(near);
+    json_object_set_new(too_near, "extra_factor", json_real(100));
+    assert_says(near,
+                "mine is 0.14 % too dark in blue on 12_point_plane (against truth), which is "
+                "not noise, but may be within the margin of 0.2 %: about 2.5 times the samples "
+                "would decide");
+    assert_says(too_near,
+                "mine is 0.14 % too dark in blue on 12_point_plane (against truth), which "
+                "is not noise, but may be within the margin of 0.2 %: more than 100 times "
+                "the samples would be needed: choose another margin, as the difference is "
+                "close to it");
+    /* Something else is too noisy: what is not noise lies inside its margin. */
+    assert_says(
+        with_significant(claim_of("INCONCLUSIVE", "EQUIVALENT", 0, 0, 0, 3), 0.005, true, 3),
+        "mine is too noisy to tell on 12_point_plane (against truth): about 2.5 times the "
+        "samples would decide");
     assert_says(
         claim_of("NO DIFFERENCE FOUND", "EQUIVALENT", 0, 0, 0, 3),
         "no difference of mine was found on 12_point_plane (against truth); 1.23 % would have been");
@@ -149,13 +180,17 @@ TEST(three_lines)
         "result: all as it should be, 1 the same within their margins, 1 deliberate mistake found\n"
         "look:   page.html\n");
     free(text);
-    /* +0.15 % +- 0.1 % is at least a quarter of 0.2 %, +0.14 % is less, and a deliberate mistake is none of these. */
-    text = printed(json_pack("[ooo]", claim_of("EQUIVALENT", "EQUIVALENT", 0.00151, 0, 0, 3),
-                             claim_of("EQUIVALENT", "EQUIVALENT", 0.00149, 0, 0, 3),
-                             claim_of("DIFFERENT", "DIFFERENT", 1, 0, 0, 3)));
+    /* -0.8 % +- 0.1 % of a tile is 0.7 of its margin of 1 %, +0.15 % of the image is a quarter of 0.2 %; a deliberate
+     * mistake is none of these. */
+    text = printed(json_pack(
+        "[oooo]", claim_of("EQUIVALENT", "EQUIVALENT", 0.001, 0, 0, 3),
+        with_significant(claim_of("EQUIVALENT", "EQUIVALENT", 0, 0, 0, 3), 0.0015, false, 3),
+        with_significant(claim_of("EQUIVALENT", "EQUIVALENT", 0, 0, 0, 3), -0.008, true, 3),
+        with_significant(claim_of("DIFFERENT", "DIFFERENT", 1, 0, 0, 3), 1, false, 3)));
     assert_non_null(strstr(text,
-                           "\nnote:   mine is 0.15 % too bright on 12_point_plane (against truth), "
-                           "which is not noise, but within its 0.2 %\nlook: "));
+                           "\nnote:   mine is 0.80 % too dark in the 16 x 16 pixels at 32,0 on "
+                           "12_point_plane (against truth), which is not noise, but within its "
+                           "1 %; and 1 more\nlook: "));
     free(text);
     /* Worst first: what is the opposite of what was expected before what is undecided. */
     text = printed(json_pack("[oo]", claim_of("INCONCLUSIVE", "EQUIVALENT", 0, 0, 0, 3),

@@ -25,7 +25,7 @@ def _check(result, report):
     if result.extra_factor > 1:
         lines.append(f"about {result.extra_factor:.2g} times the samples would decide"
                      if result.extra_factor < 100 else
-                     "more than 100 times the samples would decide: raise the margin, or the side of a tile")
+                     "more than 100 times the samples would decide: choose another margin, or larger tiles")
     lines += [f"note: {note}" for note in result.notes]
     try:
         result.write_report(page)
