@@ -119,8 +119,10 @@ static bool changed(const struct images *m, const struct change *how, int x, int
         } else if (kind == ERROR_OFFSET) {
             mean = v.mean + how->amount * m->mean;
         } else if (kind == ERROR_GAMMA) {
+            /* Near 0 the slope is infinite, and no guide to the noise: that of a standard error away is. */
+            const double from_zero = fmax(v.mean, sqrt(v.var));
             mean = v.mean > 0 ? pow(v.mean, how->factor) : 0;
-            slope = v.mean > 0 ? how->factor * mean / v.mean : 0;
+            slope = v.mean > 0 ? how->factor * pow(from_zero, how->factor - 1) : 0;
         } else if (kind == ERROR_CLAMP && v.mean > 1) {
             mean = 1;
             slope = 0;
@@ -223,7 +225,8 @@ static double removed_by(const struct images *m, enum error_mode_kind kind, doub
     return e.before[best] > 0 ? 1 - e.after[best] / e.before[best] : 0;
 }
 
-/* The amount that removes most: the best on a grid, refined by ternary search between its neighbours. */
+/* The amount that removes most: the best on a grid, refined by ternary search between its neighbours. NAN if that is at the
+ * end of what is tried. */
 static double fit(const struct images *m, enum error_mode_kind kind)
 {
     static const double reach[NUM_ERROR_MODES] = {[ERROR_SCALE] = 2,
@@ -247,7 +250,7 @@ static double fit(const struct images *m, enum error_mode_kind kind)
         else
             hi -= third;
     }
-    return (lo + hi) / 2;
+    return fabs(lo + hi) / 2 < reach[kind] + 0.99 * step ? (lo + hi) / 2 : NAN;
 }
 
 static struct hint describe(enum error_mode_kind kind, double amount, double share)
@@ -335,7 +338,8 @@ static void try(void *ctx, size_t first, size_t last)
         if (order[i] == ERROR_TRANSPOSE && m->side[0]->width != m->side[0]->height)
             continue;
         t->amount[i] = error_mode_has_amount(order[i]) ? fit(m, order[i]) : 0;
-        t->share[i] = fmin(1, removed_by(m, order[i], t->amount[i], &m->many));
+        t->share[i] =
+            isnan(t->amount[i]) ? 0 : fmin(1, removed_by(m, order[i], t->amount[i], &m->many));
     }
 }
 
@@ -347,7 +351,7 @@ bool hint_add(const struct moments *a, const struct moments *b, int threads, str
     struct images m;
     struct trials t = {.images = &m};
     double most = enough_removed - clearly;
-    if (c->verdict == VERDICT_EQUIVALENT)
+    if (c->verdict == VERDICT_EQUIVALENT || c->verdict == VERDICT_NOTHING_FOUND)
         return true;
     bool ok = open_images(a, b, &m);
     if (ok)
