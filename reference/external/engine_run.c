@@ -92,15 +92,22 @@ static bool check_image(const struct engine_job *j, const char *path, struct err
                    path, 8 * info.bytes, j->en->image);
 }
 
-/* Image k (the caller frees it): one run, or one per channel, each with its own seed and used for that channel only. */
+static struct path image_path(const struct engine_job *j, int k)
+{
+    return fs_path("%s/replicate_%04d.%s", j->dir, k, j->en->image);
+}
+
+/* Image k (the caller frees it): one run, or one per channel, each with its own seed and used for that channel only. The
+ * file of the last run is left. */
 static float *render_image(struct engine_job *j, int k, struct err *e)
 {
-    const struct path path = fs_path("%s/replicate_%04d.%s", j->dir, k, j->en->image);
+    const struct path path = image_path(j, k);
     const int runs = j->en->separate ? 3 : 1;
     const size_t pixels = (size_t)j->suite->width * (size_t)j->suite->height;
     float *out = NULL;
     for (j->channel = 0; j->channel < runs; j->channel++) {
         const size_t c = (size_t)j->channel;
+        unlink(path.s);
         float *px =
             run_process(j, replicate_seed(j->opt->seed, runs * k + j->channel), path.s, e) &&
                     check_image(j, path.s, e)
@@ -111,7 +118,6 @@ static float *render_image(struct engine_job *j, int k, struct err *e)
             free(out);
             return NULL;
         }
-        unlink(path.s);
         if (out == NULL) {
             out = px;
             continue;
@@ -145,6 +151,24 @@ static bool add_hash(struct engine_job *j, const char *sha256, struct err *e)
     return j->opt->goes_on || err_set(e, "image %zu is another one", k);
 }
 
+/* Replicate k is the same image as an earlier one: what may be wrong. */
+static bool set_repeats(const struct engine_job *j, const float *px, size_t pixels, int k,
+                        struct err *e)
+{
+    bool is_black = true;
+    for (size_t i = 0; i < 3 * pixels && is_black; i++)
+        is_black = px[i] == 0;
+    if (is_black)
+        return err_set(e, "replicate %d is black, as an earlier one is: no light was found", k);
+    return err_set(e, "replicate %d is the same image as an earlier one: %s%s", k,
+                   k > 1 ? "the program has few different images, as if {seed} did not "
+                           "decide all that is random in it"
+                         : "the seed has no effect",
+                   strcmp(j->en->image, "hdr") == 0
+                       ? ", or less than RGBE's 8 bits show: write EXR or PFM"
+                       : "");
+}
+
 /* Runs, reads and folds. */
 static bool fold_runs(struct engine_job *j, struct moments *m, struct err *e)
 {
@@ -168,20 +192,15 @@ static bool fold_runs(struct engine_job *j, struct moments *m, struct err *e)
         if (j->en->output == OUTPUT_MEAN)
             ok = add_hash(j, repeats.sha256[k], e);
         if (ok && j->en->output == OUTPUT_MEAN && repeats.same >= 0 && !repeats.without_noise)
-            ok = err_set(e, "replicate %d is the same image as an earlier one: %s%s", repeats.same,
-                         repeats.same > 1
-                             ? "the program has few different images, as if {seed} did not "
-                               "decide all that is random in it"
-                             : "the seed has no effect",
-                         strcmp(j->en->image, "hdr") == 0
-                             ? ", or less than RGBE's 8 bits show: write EXR or PFM"
-                             : "");
+            ok = set_repeats(j, px, pixels, k, e);
         moments_add_image(m, px);
         replicates_add(&seen, px);
         ok = ok && (!has_blocks || block_means_add(&blocks, px, e));
         if (j->opt->on_replicate != NULL)
             j->opt->on_replicate(j->opt->on_replicate_ctx, k, px);
         free(px);
+        if (ok)
+            unlink(image_path(j, k).s);
     }
     if (ok && j->en->output == OUTPUT_NOISY)
         make_single(m, "picture", 3);
