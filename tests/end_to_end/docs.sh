@@ -141,7 +141,7 @@ cp reference/scenes/41_cornell.dae scene.dae
 cp "$top/README.md" .
 for page in tools/docs/guide-renderer.md tools/docs/guide-report.md README.md; do
     case $page in
-    *renderer*) pattern="^result: all as it should be, 9 the same" ;;
+    *renderer*) pattern="^result: all as it should be, 4 the same" ;;
     *) pattern="^DIFFERENT: " ;;
     esac
     case $page:$(head -c 300 walk.out) in

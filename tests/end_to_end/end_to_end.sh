@@ -750,7 +750,6 @@ expect "a validation of a wrong renderer" 1 "DIFFERENT" "$assay" validate --only
     --pathtracer "$plain/mutants/point_light_linear/pathtracer" --out "$tmp/wrong_suite"
 expect "diagnose: the images of a validation" 1 "tests/mutants/point_light_linear.patch" \
     "$assay" diagnose "$tmp/wrong_suite/results.json"
-# The renderer of --engine is diagnosed, not ours beside it, which is right.
 sed "s|{here}/mine.sh|$tmp/wrong_engine.sh|; s|\"spp\": 32, \"replicates\": 64|\"spp\": 16, \"replicates\": 16|" reference/engines/mine.json >"$tmp/wrong_engine.json"
 sed "s|^exec pathtracer|exec '$plain/mutants/point_light_linear/pathtracer'|" reference/engines/mine.sh >"$tmp/wrong_engine.sh"
 chmod +x "$tmp/wrong_engine.sh"

@@ -105,7 +105,7 @@ static void keep_selected(struct validation *v)
     v->num_tasks = kept;
 }
 
-/* Sets can[i] for the selected scenes that the further engine can express; appends the others to `cannot`. */
+/* Sets can[i] for the selected scenes that the other engine can express; appends the others to `cannot`. */
 static bool ask_engine(const struct validation *v, bool *can, json_t *cannot, struct err *e)
 {
     const struct validate_options *o = v->opt;
@@ -255,33 +255,16 @@ static void add_task(struct validation *v, const struct suite_scene *s, struct s
     claim_next_look(t);
 }
 
-/* Adds a scene's tasks in the order of the results. Of our suite: our renderer against each reference; each engine
- * against the closed form, if there is one (probes that the engine is set up right); the further engine against all
- * of these and ours; our variants; stated errors; noise. */
-static void add_scene(struct validation *v, const struct suite_scene *s, bool engine_can,
-                      bool of_noise)
+/* The other engine against each reference and, of our suite, against ours. */
+static void add_engine(struct validation *v, const struct suite_scene *s)
 {
     struct scene_sides *own = &v->sides[s - v->suite.scene];
     struct scene_sides *theirs =
         &v->sides[suite_find(&v->suite, s->references_of) - v->suite.scene];
-    struct side *from = theirs->reference;
-    bool filtered = engine_can && v->opt->engine->filter.radius > 0;
-    struct side *peer = filtered ? theirs->peer : from;
-    const struct suite_reference *truth = suite_reference_of(s, "truth");
+    const bool is_filtered = v->opt->engine->filter.radius > 0;
+    struct side *peer = is_filtered ? theirs->peer : theirs->reference;
     struct suite_reference self = {.engine = "pathtracer", .fidelity = "exact"};
-    int t = truth != NULL ? (int)(truth - s->reference) : 0;
-    if (v->suite.is_own) { /* a suite of one's own judges the engine alone */
-        for (int i = 0; engine_can && i < s->num_references; i++)
-            if (peer[i].scene != NULL)
-                add_task(v, s, &own->engine, &peer[i], &s->reference[i], s->expect);
-        return;
-    }
-    for (int i = 0; i < s->num_references; i++)
-        add_task(v, s, &own->ours, &from[i], &s->reference[i], s->expect);
-    for (int i = 0; truth != NULL && i < s->num_references; i++)
-        if (i != t)
-            add_task(v, s, &from[i], &from[t], truth, s->expect);
-    for (int i = 0; engine_can && i < s->num_references; i++) {
+    for (int i = 0; i < s->num_references; i++) {
         const struct suite_reference *ref = &s->reference[i];
         if (peer[i].scene != NULL)
             add_task(v, s, &own->engine, &peer[i], ref, s->expect);
@@ -289,9 +272,24 @@ static void add_scene(struct validation *v, const struct suite_scene *s, bool en
         self.margin_global = fmax(self.margin_global, ref->margin_global);
         self.margin_tile = fmax(self.margin_tile, ref->margin_tile);
     }
-    if (engine_can) /* ours renders the same scene: equal in scenes 9x, too */
-        add_task(v, s, &own->engine, filtered ? &own->peer_ours : &own->ours, &self,
+    if (!v->suite.is_own) /* ours renders the same scene: equal in scenes 9x, too */
+        add_task(v, s, &own->engine, is_filtered ? &own->peer_ours : &own->ours, &self,
                  VERDICT_EQUIVALENT);
+}
+
+/* Adds a scene's tasks in the order of the results: our renderer against each reference; each engine against the closed
+ * form, if there is one (probes that the engine is set up right); our variants; stated errors; noise. */
+static void add_scene(struct validation *v, const struct suite_scene *s, bool of_noise)
+{
+    struct scene_sides *own = &v->sides[s - v->suite.scene];
+    struct side *from = v->sides[suite_find(&v->suite, s->references_of) - v->suite.scene].reference;
+    const struct suite_reference *truth = suite_reference_of(s, "truth");
+    const int t = truth != NULL ? (int)(truth - s->reference) : 0;
+    for (int i = 0; i < s->num_references; i++)
+        add_task(v, s, &own->ours, &from[i], &s->reference[i], s->expect);
+    for (int i = 0; truth != NULL && i < s->num_references; i++)
+        if (i != t)
+            add_task(v, s, &from[i], &from[t], truth, s->expect);
     /* Variants of our renderer, against the closed form or else the first reference. */
     for (int i = 0; i < s->num_variants; i++) {
         struct suite_reference ref = s->reference[t];
@@ -327,8 +325,10 @@ bool select_claims(struct validation *v, json_t *cannot, struct err *e)
     ok = ok && (v->task != NULL || err_set(e, "out of memory"));
     bool of_noise = noise_ladder_is_kept(v->opt->golden_dir, &v->suite);
     for (int i = 0; ok && i < v->suite.num_scenes; i++)
-        if (scene_is_selected(v->opt, v->suite.scene[i].name))
-            add_scene(v, &v->suite.scene[i], can[i], of_noise);
+        if (can[i])
+            add_engine(v, &v->suite.scene[i]);
+        else if (v->opt->engine == NULL && scene_is_selected(v->opt, v->suite.scene[i].name))
+            add_scene(v, &v->suite.scene[i], of_noise);
     free(can);
     ok = ok && check_claims(v, e);
     if (ok)

@@ -15,7 +15,8 @@ struct validate_options {
     const char *suite_dir, *golden_dir, *out_dir, *share_dir;
     const char *pathtracer; /* the program under test */
     /* SCENE for all its claims, or SCENE/CLAIM, where CLAIM is the name of a reference (pathtracer against it), the
-     * name of a variant of ours, "consistency", "noise", or A:B for any other pair. None: everything is judged. */
+     * name of a variant of ours, "consistency", "noise", or A:B for any other pair. None: everything is judged. With
+     * `engine` these are NAME:REFERENCE and NAME:pathtracer. */
     const char *only[MAX_ONLY];
     int num_only;
     bool live;     /* render the references now instead of reading the goldens */
@@ -23,7 +24,7 @@ struct validate_options {
     int of_claims; /* size of that family, if this run judges only a part; 0: the claims judged */
     uint64_t seed; /* of our render */
     uint32_t reference_seed;     /* live: of the references */
-    const struct engine *engine; /* a further engine, judged against references and ours, or NULL */
+    const struct engine *engine; /* NULL, or another engine, which alone is judged: against references and ours */
     int engine_spp, engine_replicates; /* 0: as its description says */
     bool
         repeats_seeds; /* the engine is rendered with the seeds of each stored reference first, and is EQUIVALENT
@@ -51,7 +52,7 @@ struct validate_options {
     bool (*show)(const json_t *so_far, const struct validate_options *opt, struct err *e);
 };
 
-/* What cannot be rendered in parts is judged once, at its declared size: adaptive variants, the further engine, and
+/* What cannot be rendered in parts is judged once, at its declared size: adaptive variants, the other engine, and
  * stated errors. Goldens and closed forms do not grow; our renders grow by ranges of sample numbers, with --live
  * those of engines by further replicates. A claim of noise has looks of its own.
  *
@@ -59,10 +60,10 @@ struct validate_options {
  * INCONCLUSIVE with an error line and no numbers; never a pass.
  *
  * Fills *results (results.h; a new reference) and writes below out_dir: data/<scene>/<engine>.exr (with several
- * looks <engine>_<observations>.exr), z_<a>_<b>.exr and rel_<a>_<b>.exr, for the further engine also its manifest
+ * looks <engine>_<observations>.exr), z_<a>_<b>.exr and rel_<a>_<b>.exr, for the other engine also its manifest
  * <engine>.json. Scenes that it cannot express are listed in "not_expressible": [{"scene":, "engine":, "reason":}].
  * With `live`, "loader" is the report of import_check() on the same scenes. A claim that cannot be judged is in the
- * results with its error. False only if nothing could be judged at all (no suite, no output directory, a further
+ * results with its error. False only if nothing could be judged at all (no suite, no output directory, another
  * engine that can express none of the scenes), or if show() ended the run. */
 NODISCARD bool validate(const struct validate_options *opt, int argc, char **argv, json_t **results,
                         struct err *e);

@@ -48,8 +48,8 @@ static const struct cli_option options[] = {
     {0, "pathtracer", "FILE", "program under test (pathtracer beside this program)",
      TO(opt.pathtracer)},
     {0, "engine", "FILE",
-     "also judge the renderer described by FILE, against references and\n"
-     "ours; a bare NAME means SHARE/engines/NAME.json",
+     "judge the renderer described by FILE in place of ours, against\n"
+     "references and ours; a bare NAME means SHARE/engines/NAME.json",
      TO(engine_file)},
     {0, "engine-spp", "N", "samples per pixel of --engine (as in its file)", TO(opt.engine_spp), 1,
      1 << 24},

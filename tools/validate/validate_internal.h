@@ -12,7 +12,7 @@
 #include <pthread.h>
 
 enum { NUM_STAGES = 2, CLAIM_NAME = 256 };
-/* Of a scene: each reference against ours, the closed form and the further engine; that engine against ours; variants;
+/* Of a scene: each reference against ours, the closed form and the other engine; that engine against ours; variants;
  * stated errors; noise. */
 enum { MAX_CLAIMS = 3 * MAX_REFERENCES + MAX_VARIANTS + 3 };
 
@@ -21,7 +21,7 @@ enum side_kind {
     SIDE_TRUTH,  /* a closed form: exact, for every look */
     SIDE_GOLDEN, /* stored: the same image, and so the same noise, at every look and stage */
     SIDE_LIVE,   /* an engine's replicates, rendered now */
-    SIDE_ENGINE  /* the further engine */
+    SIDE_ENGINE  /* the other engine */
 };
 
 /* The image of a side at one look. */
@@ -116,7 +116,7 @@ double validate_time_left(const struct validation *v);
 enum fetch_result { FETCH_OK, FETCH_FAILED /* the side's e says why */, FETCH_NO_TIME };
 
 /* Can the side take more samples? Has it an image at every look? Can it be rendered again with fresh seeds? Adaptive
- * variants, whose samples depend on each other, and the further engine cannot grow. */
+ * variants, whose samples depend on each other, and the other engine cannot grow. */
 bool side_grows(const struct side *s);
 bool side_is_at_any_look(const struct side *s);
 bool side_can_be_fresh(const struct side *s);
@@ -153,7 +153,7 @@ bool scene_is_selected(const struct validate_options *o, const char *name);
 bool scene_is_selected_whole(const struct validate_options *o, const char *name);
 /* SCENE/CLAIM, as --only takes it: see validate.h. */
 void claim_run_name(const struct claim_run *t, char name[CLAIM_NAME]);
-/* Sets up sides and tasks of the selected scenes and claims; appends scenes that the further engine cannot express
+/* Sets up sides and tasks of the selected scenes and claims; appends scenes that the other engine cannot express
  * to `cannot`. Fails on an unknown name, and if the engine can express no scene, unless this run is part of a
  * larger one. */
 NODISCARD bool select_claims(struct validation *v, json_t *cannot, struct err *e);
