@@ -109,7 +109,7 @@ static void write_cell(FILE *f, const struct claim_ref *c)
 
 static void write_row(struct page *p, const struct claim_ref *claim, size_t num,
                       const struct claim_ref *first, const char *program, const char *const *column,
-                      size_t num_columns)
+                      size_t num_columns, bool has_others)
 {
     size_t others = 0, good = 0;
     fputs("<tr><td class=\"thumb\">", p->f);
@@ -138,7 +138,7 @@ static void write_row(struct page *p, const struct claim_ref *claim, size_t num,
             good += claim[i].outcome == OUTCOME_AS_EXPECTED;
         }
     if (others == 0)
-        fputs("<td></td></tr>\n", p->f);
+        fputs(has_others ? "<td></td></tr>\n" : "</tr>\n", p->f);
     else if (good == others)
         fprintf(p->f, "<td class=\"num\">✓ %zu</td></tr>\n", others);
     else
@@ -149,12 +149,16 @@ void report_matrix(struct page *p, const struct claim_ref *claim, size_t num)
 {
     const char *column[MOST_COLUMNS], *program = tested_program(claim, num);
     size_t num_columns = 0, scenes = 0;
+    bool has_others = false, has_mistakes = false;
     for (size_t i = 0; i < num; i++) {
         const char *b = member_text(claim[i].json, "b");
         size_t k = 0;
         while (k < num_columns && strcmp(column[k], b) != 0)
             k++;
         scenes += is_first_of_scene(claim, i);
+        has_others = has_others || !is_of(&claim[i], program);
+        has_mistakes =
+            has_mistakes || strcmp(member_or_empty(claim[i].json, "expected"), "DIFFERENT") == 0;
         if (is_of(&claim[i], program) && k == num_columns && num_columns < MOST_COLUMNS)
             column[num_columns++] = b;
     }
@@ -167,15 +171,16 @@ void report_matrix(struct page *p, const struct claim_ref *claim, size_t num)
                program);
     for (size_t k = 0; k < num_columns; k++)
         html_print(p->f, "<th class=\"num\">against %s</th>", column[k]);
-    fputs("<th class=\"num\">others</th></tr></thead>\n<tbody>\n", p->f);
+    fprintf(p->f, "%s</tr></thead>\n<tbody>\n", has_others ? "<th class=\"num\">others</th>" : "");
     for (size_t i = 0; i < num; i++)
         if (is_first_of_scene(claim, i))
-            write_row(p, claim, num, &claim[i], program, column, num_columns);
-    fputs(
+            write_row(p, claim, num, &claim[i], program, column, num_columns, has_others);
+    fprintf(
+        p->f,
         "</tbody>\n</table>\n</div>\n<p class=\"caption\">✓ as it should be, ✗ not, ? undecided, "
-        "! not judged. The number is how much brighter the image is, in %. Without a word below it "
-        "the two are EQUIVALENT, the image and all tiles. Scenes 9x are deliberate mistakes, which "
-        "must be DIFFERENT. <b>Others</b>: comparisons of other programs on the scene. A cell leads "
-        "to its evidence.</p>\n</section>\n",
-        p->f);
+        "! not judged. The number is how much brighter the image is, in %%. Without a word below it "
+        "the two are EQUIVALENT, the image and all tiles. %s%sA cell leads to its "
+        "evidence.</p>\n</section>\n",
+        has_mistakes ? "Deliberate mistakes must be DIFFERENT. " : "",
+        has_others ? "<b>Others</b>: comparisons of other programs on the scene. " : "");
 }

@@ -150,17 +150,15 @@ static void tell(const struct traits *t, FILE *to)
 {
     struct place best[MOST_KEPT];
     find_places(t, best);
-    const bool is_few = num_scenes(t) < FEW_SCENES;
     const char *only = only_scene(t);
-    if (best[0].bits == 0 && t->num_differ == t->num_claims && !is_few)
+    if (best[0].bits == 0 && num_scenes(t) < FEW_SCENES)
+        return;
+    if (best[0].bits == 0 && t->num_differ == t->num_claims)
         fprintf(
             to,
             "Every claim differs, all %d: look at what all scenes need, such as the camera, the "
             "loader, the film.",
             t->num_claims);
-    else if (best[0].bits == 0 && is_few)
-        fprintf(to, "%d of %d claims differ; what these have in common shows in more scenes.",
-                t->num_differ, t->num_claims);
     else if (best[0].bits == 0 && only != NULL) {
         fprintf(to,
                 "Only %s differs, although scenes that agree have each thing that it has: look at "
