@@ -98,7 +98,8 @@ static const struct cli_option options[] = {
      TO(job.min_side), 1, 65536},
     {0, "curve", "CURVE",
      "encoding curve of PNG and PPM files (radiance to code): srgb, linear,\n"
-     "gamma=G (G in 0.2 to 5), or cgl, the assignment's",
+     "gamma=G (0.2 to 5), exposure=E (1 - exp(-E L), then srgb: Scotty3D's), or\n"
+     "cgl, the assignment's",
      .read = read_curve},
     {0, "spp-a", "N",
      "samples per pixel of A, if its file only states a variance, or of\n"

@@ -36,6 +36,7 @@ static struct bin bin_of(const struct image_file *pic, const struct curve *curve
         int steps = pic->info.type == IMAGE_INT8 ? 255 : 65535, k = (int)lround((double)v * steps);
         double lo, hi;
         tone_curve_bin(curve, k, steps, &lo, &hi);
+        hi = isinf(hi) ? lo : hi; /* it is saturated: how bright it is is not known anyway */
         b = (struct bin){(lo + hi) / 2, hi - lo, (hi - lo) / 2, k == steps};
         break;
     }
@@ -84,8 +85,7 @@ static bool check_options(const char *path, char side, const struct image_file *
                        side);
     if (is_coded(pic) && opt->curve == NULL)
         return err_set(e,
-                       "%s: has %d bits, what light is a code? (--curve srgb, linear, gamma=G or "
-                       "cgl)",
+                       "%s: has %d bits, what light is a code? (--curve: one of " TONE_CURVES ")",
                        path, pic->info.type == IMAGE_INT8 ? 8 : 16);
     return true;
 }

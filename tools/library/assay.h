@@ -81,7 +81,8 @@ struct assay_options {
         accept_mdb; /* 0: NO DIFFERENCE FOUND never passes; else it does if the image's MDB is at most this, relative */
     double accept_mdb_tile; /* 0: 4 times that */
     double spp[2];     /* samples per pixel, of a file that has a variance but not these, or of each replicate */
-    const char *curve; /* tone curve of integers: "srgb", "linear", "gamma=2.2", "cgl"; or NULL */
+    const char *
+        curve; /* tone curve of integers: "srgb", "linear", "gamma=2.2", "exposure=1", "cgl"; or NULL */
     int tile;          /* 16: side of a reporting tile, pixels */
     bool paired;       /* both sides share their noise: it is taken from A - B */
     bool exchangeable; /* an exact test by permutation of replicates, without margins */

@@ -130,7 +130,7 @@ static void check_head(struct rubric *r, struct rubric_mistakes *m)
     set_default(r->program, sizeof r->program, "pathtracer");
     if (!tone_curve_parse(r->curve, &curve, &e))
         rubric_mistake(m, rubric_line_of(r->lines, "curve", LINE_WHOLE),
-                       "curve '%s' is none of: srgb, linear, gamma=G, cgl", r->curve);
+                       "curve '%s' is none of: " TONE_CURVES, r->curve);
     const char *dot = strrchr(r->output, '.');
     if (dot == NULL || !is_word(dot, (const char *const[]){".png", ".exr", ".pfm", ".hdr", NULL}) ||
         r->output[strspn(r->output,

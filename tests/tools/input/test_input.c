@@ -417,7 +417,16 @@ TEST(test_curves)
     tone_curve_bin(&c, 51, 255, &lo, &hi);
     assert_near(lo, pow(0.2, 2.2) / sqrt(2), 1e-15);
     assert_near(hi, pow(52.0 / 255, 2.2) / sqrt(2), 1e-15);
-    static const char *const bad[] = {"", "rec709", "gamma", "gamma=", "gamma=0", "gamma=x"};
+    /* Scotty3D's: L = ln(2)/2 at an exposure of 2 is 1 - 1/2, the sRGB code of which is 0.735357 (IEC 61966-2-1); of the
+     * last code nothing is known but that it is bright: (254.5/255 as radiance) 0.9955 leaves 0.0045. */
+    assert_true(tone_curve_parse("exposure=2", &c, &e));
+    assert_near(tone_curve_decode(&c, 0.735356983052449), log(2) / 2, 1e-12);
+    assert_near(tone_curve_decode(&c, 0), 0, 1e-15);
+    tone_curve_bin(&c, 255, 255, &lo, &hi);
+    assert_near(lo, -log(1 - pow((254.5 / 255 + 0.055) / 1.055, 2.4)) / 2, 1e-12);
+    assert_true(isinf(hi));
+    static const char *const bad[] = {"",        "rec709",   "gamma",     "gamma=",    "gamma=0",
+                                      "gamma=x", "exposure", "exposure=", "exposure=0"};
     for (size_t i = 0; i < COUNT(bad); i++)
         assert_false(tone_curve_parse(bad[i], &c, &e));
 }

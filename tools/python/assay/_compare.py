@@ -164,7 +164,7 @@ def compare(a, b, *, margin=None, margin_tile=None, margin_variance=None, accept
     exchangeable: exact test by permutation of replicates
     same_program: exact test of "nothing changed" between two versions with equally many samples; filter_width: pixels
       nearer than this may share noise (0: it is measured; 1: none do, also of images without moments)
-    curve: of integer images: "srgb", "linear", "gamma=2.2", "cgl"
+    curve: of integer images: "srgb", "linear", "gamma=2.2", "exposure=1", "cgl"
     spp_a, spp_b: samples per pixel of a file with a variance only, or of each replicate: variances are then of one path
     """
     options = Options()
